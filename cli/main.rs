@@ -1,0 +1,2 @@
+//! The `flyby` program.
+fn main() {}
