@@ -1,0 +1,194 @@
+//! The operations of a field graph: numbers, names, what they take and what they give.
+//!
+//! An opcode, once released, is never given another meaning and never reused:
+//! the canonical bytes of every scene hold them.
+
+/// What a node of a graph yields at a point.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Kind {
+    /// One number.
+    Scalar,
+    /// Three numbers: a place or a direction.
+    Vector,
+}
+
+/// The shape of a noise within a frequency cascade.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Basis {
+    /// f_N itself, as in thesis eq. (3.40).
+    Plain,
+    /// |f_N|, Perlin's turbulence (thesis §3.3.3).
+    Absolute,
+    /// (1 − |f_N|)², Musgrave's ridged noise (thesis §3.3.3).
+    Ridged,
+}
+
+impl Basis {
+    /// Every basis, in the order of their numbers.
+    pub const ALL: [Self; 3] = [Self::Plain, Self::Absolute, Self::Ridged];
+
+    /// The number that stands for it among a node's parameters.
+    pub fn number(self) -> f64 {
+        match self {
+            Self::Plain => 0.0,
+            Self::Absolute => 1.0,
+            Self::Ridged => 2.0,
+        }
+    }
+
+    /// The basis of that number.
+    pub fn from_number(number: f64) -> Option<Self> {
+        Self::ALL.into_iter().find(|basis| basis.number() == number)
+    }
+}
+
+/// How many parameters an operation takes.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Params {
+    /// Exactly these, by name.
+    Named(&'static [&'static str]),
+    /// Pairs of an instant and a value, at least one, instants rising.
+    Keys,
+}
+
+/// What an operation takes and gives.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Signature {
+    /// Its name in messages and listings.
+    pub name: &'static str,
+    /// The kinds of its arguments.
+    pub args: &'static [Kind],
+    /// Its constants.
+    pub params: Params,
+    /// What it yields.
+    pub result: Kind,
+}
+
+macro_rules! ops {
+    ($($(#[doc = $doc:literal])+ $op:ident = $code:literal $name:literal ($($arg:ident),*) $params:expr => $result:ident;)+) => {
+        /// An operation of a field graph. `a`, `b`, `c` are its arguments in order.
+        #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+        #[repr(u16)]
+        pub enum Op { $($(#[doc = $doc])+ $op = $code,)+ }
+
+        impl Op {
+            /// Every operation, by rising opcode.
+            pub const ALL: &'static [Self] = &[$(Self::$op),+];
+
+            /// What it takes and gives.
+            pub const fn signature(self) -> Signature {
+                match self {
+                    $(Self::$op => Signature {
+                        name: $name,
+                        args: &[$(Kind::$arg),*],
+                        params: $params,
+                        result: Kind::$result,
+                    },)+
+                }
+            }
+        }
+    };
+}
+
+const NONE: Params = Params::Named(&[]);
+const CASCADE: Params = Params::Named(&[
+    "basis",
+    "key",
+    "lacunarity",
+    "hurst",
+    "octaves",
+    "xi",
+    "detail",
+]);
+
+ops! {
+    /// The constant `value`.
+    Constant = 1 "constant" () Params::Named(&["value"]) => Scalar;
+    /// The point itself, in world metres.
+    Position = 2 "p" () NONE => Vector;
+    /// The instant in seconds from image 0.
+    Time = 3 "t" () NONE => Scalar;
+    /// A curve over `a`: `keys` are (instant, value) pairs, joined by straight lines, constant outside.
+    Linear = 4 "linear" (Scalar) Params::Keys => Scalar;
+    /// A curve over `a`: monotone cubic through the keys, constant outside.
+    Smooth = 5 "smooth" (Scalar) Params::Keys => Scalar;
+
+    /// (a, b, c).
+    Vector = 16 "vec" (Scalar, Scalar, Scalar) NONE => Vector;
+    /// The first component.
+    X = 17 "x" (Vector) NONE => Scalar;
+    /// The second component.
+    Y = 18 "y" (Vector) NONE => Scalar;
+    /// The third component: up.
+    Z = 19 "z" (Vector) NONE => Scalar;
+    /// a + b.
+    VectorAdd = 20 "add" (Vector, Vector) NONE => Vector;
+    /// a − b.
+    VectorSub = 21 "sub" (Vector, Vector) NONE => Vector;
+    /// a times the number b.
+    Scale = 22 "scale" (Vector, Scalar) NONE => Vector;
+    /// ‖a‖; its gradient at the origin is zero.
+    Length = 23 "length" (Vector) NONE => Scalar;
+    /// a · b.
+    Dot = 24 "dot" (Vector, Vector) NONE => Scalar;
+    /// `radius` · a/‖a‖: the nearest point on a sphere, thesis eq. (2.25). The origin goes to itself.
+    OntoSphere = 25 "onto_sphere" (Vector) Params::Named(&["radius"]) => Vector;
+    /// (x, y, 0): the nearest point on the horizontal plane, thesis eq. (2.24).
+    OntoPlane = 26 "onto_plane" (Vector) NONE => Vector;
+
+    /// a + b.
+    Add = 32 "+" (Scalar, Scalar) NONE => Scalar;
+    /// a − b.
+    Sub = 33 "-" (Scalar, Scalar) NONE => Scalar;
+    /// a b.
+    Mul = 34 "*" (Scalar, Scalar) NONE => Scalar;
+    /// a / b.
+    Div = 35 "/" (Scalar, Scalar) NONE => Scalar;
+    /// −a.
+    Neg = 36 "neg" (Scalar) NONE => Scalar;
+    /// |a|.
+    Abs = 37 "abs" (Scalar) NONE => Scalar;
+    /// The smaller of a and b.
+    Min = 38 "min" (Scalar, Scalar) NONE => Scalar;
+    /// The larger of a and b.
+    Max = 39 "max" (Scalar, Scalar) NONE => Scalar;
+    /// √a, 0 for a < 0.
+    Sqrt = 40 "sqrt" (Scalar) NONE => Scalar;
+    /// sign(a) · |a|^`exponent` (ERRATA row 1232: the sign is kept).
+    Power = 41 "pow" (Scalar) Params::Named(&["exponent"]) => Scalar;
+    /// sin a, radians.
+    Sin = 42 "sin" (Scalar) NONE => Scalar;
+    /// cos a, radians.
+    Cos = 43 "cos" (Scalar) NONE => Scalar;
+    /// eᵃ.
+    Exp = 44 "exp" (Scalar) NONE => Scalar;
+    /// 0 below `low`, 1 above `high`, 3u² − 2u³ between.
+    SmoothStep = 45 "smoothstep" (Scalar) Params::Named(&["low", "high"]) => Scalar;
+    /// b where a < 0, else c.
+    Select = 46 "select" (Scalar, Scalar, Scalar) NONE => Scalar;
+
+    /// Gradient noise f_N(a), thesis eq. (4.9), over the lattice of `key`.
+    Noise = 64 "noise" (Vector) Params::Named(&["key"]) => Scalar;
+    /// Rescale-and-add, thesis eqs. (3.40)–(3.42) mended: Σ r^{−iH} basis(rⁱ a), i = 0 … octaves − 1.
+    Sum = 65 "fbm" (Vector) CASCADE => Scalar;
+    /// Musgrave's first statistics-by-altitude model, thesis eq. (3.44), started at basis(a) + ξ.
+    AltitudeOne = 66 "altitude1" (Vector) CASCADE => Scalar;
+    /// Musgrave's second statistics-by-altitude model, thesis eq. (3.45), started at basis(a) + ξ.
+    AltitudeTwo = 67 "altitude2" (Vector) CASCADE => Scalar;
+    /// Musgrave's ridged multifractal: s₀ = (o − |n|)², sᵢ = clamp(g sᵢ₋₁, 0, 1)(o − |n|)², Σ r^{−iH} sᵢ.
+    RidgedMultifractal = 68 "ridged_multifractal" (Vector) Params::Named(&[
+        "key", "lacunarity", "hurst", "octaves", "offset", "gain", "detail",
+    ]) => Scalar;
+}
+
+impl Op {
+    /// The number that stands for it in canonical bytes.
+    pub const fn code(self) -> u16 {
+        self as u16
+    }
+
+    /// The operation of that number.
+    pub fn from_code(code: u16) -> Option<Self> {
+        Self::ALL.iter().copied().find(|op| op.code() == code)
+    }
+}
