@@ -1,0 +1,79 @@
+//! The settings that both ends of a connection share, and a client's way in.
+//!
+//! HTTP/2's windows default to 1 MiB for a stream *and* for a connection, so one stalled
+//! upload would starve all others; and nobody would notice a dead link.
+
+use std::net::SocketAddr;
+use std::time::Duration;
+
+use tonic::codegen::InterceptedService;
+use tonic::transport::{Channel, Endpoint};
+
+use crate::auth::Token;
+use crate::proto::farm_client::FarmClient;
+use crate::proto::workers_client::WorkersClient;
+
+/// Bytes under way on one connection.
+pub const CONNECTION_WINDOW_BYTES: u32 = 16 << 20;
+
+/// Bytes under way on one stream.
+pub const STREAM_WINDOW_BYTES: u32 = 2 << 20;
+
+/// Largest message on any stream; a block's is about 32 KiB, a chunk's about 1 MiB.
+pub const MESSAGE_BYTES_MAX: usize = 2 << 20;
+
+/// Most bytes of a scene, an asset or a frame in one message.
+pub const CHUNK_BYTES: usize = 1 << 20;
+
+/// How long a connection is silent before the other side is asked whether it lives.
+pub const KEEPALIVE_INTERVAL: Duration = Duration::from_secs(10);
+
+/// How long the other side may take to answer that.
+pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(20);
+
+/// How long opening a connection may take.
+pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Largest scene description.
+pub const DESCRIPTION_BYTES_MAX: u64 = 64 << 20;
+
+/// Largest asset.
+pub const ASSET_BYTES_MAX: u64 = 256 << 20;
+
+/// The way to a coordinator, with this module's settings; nothing is opened yet.
+pub fn endpoint(coordinator: SocketAddr) -> Endpoint {
+    Endpoint::from_shared(format!("http://{coordinator}"))
+        .expect("a socket address is an authority")
+        .connect_timeout(CONNECT_TIMEOUT)
+        .tcp_nodelay(true)
+        .initial_connection_window_size(CONNECTION_WINDOW_BYTES)
+        .initial_stream_window_size(STREAM_WINDOW_BYTES)
+        .http2_keep_alive_interval(KEEPALIVE_INTERVAL)
+        .keep_alive_timeout(KEEPALIVE_TIMEOUT)
+        .keep_alive_while_idle(true)
+}
+
+/// A user's client over an open connection.
+pub type Farm = FarmClient<InterceptedService<Channel, Token>>;
+
+/// A worker's client over an open connection.
+pub type Workers = WorkersClient<InterceptedService<Channel, Token>>;
+
+/// Opens a connection for a user.
+pub async fn farm(coordinator: SocketAddr, token: Token) -> Result<Farm, tonic::transport::Error> {
+    let channel = endpoint(coordinator).connect().await?;
+    Ok(FarmClient::with_interceptor(channel, token)
+        .max_decoding_message_size(MESSAGE_BYTES_MAX)
+        .max_encoding_message_size(MESSAGE_BYTES_MAX))
+}
+
+/// Opens a connection for a worker.
+pub async fn workers(
+    coordinator: SocketAddr,
+    token: Token,
+) -> Result<Workers, tonic::transport::Error> {
+    let channel = endpoint(coordinator).connect().await?;
+    Ok(WorkersClient::with_interceptor(channel, token)
+        .max_decoding_message_size(MESSAGE_BYTES_MAX)
+        .max_encoding_message_size(MESSAGE_BYTES_MAX))
+}
