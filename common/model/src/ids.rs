@@ -32,6 +32,10 @@ pub struct WorkerId {
     pub incarnation: u64,
 }
 
+/// The renderer's revision: two revisions make different pixels, so a job is pinned to one.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
+pub struct Revision(pub u32);
+
 /// Counts the starts of a coordinator over one store; it rises durably.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug, Default)]
 pub struct Epoch(pub u64);
@@ -53,6 +57,12 @@ impl fmt::Display for JobId {
 }
 
 impl fmt::Display for ImageNumber {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(&self.0, f)
+    }
+}
+
+impl fmt::Display for Revision {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         fmt::Display::fmt(&self.0, f)
     }

@@ -11,11 +11,13 @@ pub mod digest;
 pub mod film;
 pub mod frames;
 pub mod ids;
+pub mod lease;
 pub mod rect;
 pub mod time;
 
 pub use digest::Digest;
 pub use frames::FrameRange;
-pub use ids::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, SubmissionId, WorkerId};
+pub use ids::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Revision, SubmissionId, WorkerId};
+pub use lease::{Lease, Running};
 pub use rect::{Rect, Resolution};
 pub use time::{Span, Timestamp};

@@ -1,1 +1,33 @@
-//! (empty)
+//! The scheduler: events in, effects out, and nothing else.
+//!
+//! It decides which worker renders which tile of which image, which reports
+//! count, and when an image or a job is over. It knows no clock, file, socket,
+//! thread or randomness, nor what a scene is: to it a tile is a rectangle and
+//! an attempt. The shell around it (`server`) turns whatever happens into an
+//! [`Event`], calls [`Sched::handle`] and performs the [`Effect`]s in order.
+//!
+//! What always holds, after every event (`Sched::check_invariants` says it in code):
+//! a tile has at most two live attempts, and each of them ends by its blocks, by being given
+//! back or by a limit; a worker never holds more than its credit by a new lease; no pixel is counted
+//! twice; an image is encoded when its last pixel is durable, and never before.
+//!
+//! `tests/histories.rs` shows it whole under random events.
+#![no_std]
+
+extern crate alloc;
+
+mod config;
+mod effect;
+mod event;
+mod refusal;
+mod sched;
+mod view;
+
+pub use config::{Config, Limits};
+pub use effect::{Effect, JobOutcome, RevokeReason};
+pub use event::{BlockRef, Event, LinkId, Submission, TileShape};
+pub use refusal::{BlockRefusal, SubmitRefusal, Verdict, WorkerRefusal};
+pub use sched::Sched;
+pub use view::{
+    ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, WorkerView,
+};

@@ -1,0 +1,140 @@
+//! What the shell must now do.
+
+use alloc::vec::Vec;
+
+use model::{AttemptId, ImageRef, JobId, Lease, Rect, SubmissionId, WorkerId};
+
+use crate::{BlockRef, BlockRefusal, SubmitRefusal, WorkerRefusal};
+
+/// Something to do. Effects are performed in order; each may be repeated without harm.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Effect {
+    /// The submission is this job, taken now or before.
+    Submitted {
+        /// Which submission.
+        submission: SubmissionId,
+        /// The job's number.
+        job: JobId,
+    },
+    /// The submission is refused and changed nothing.
+    SubmitRefused {
+        /// Which submission.
+        submission: SubmissionId,
+        /// Why.
+        refusal: SubmitRefusal,
+    },
+    /// Tell a worker that it is taken.
+    Welcome {
+        /// The worker.
+        worker: WorkerId,
+        /// Of the attempts that it said it holds, those that are live: it drops the others.
+        live: Vec<AttemptId>,
+    },
+    /// Tell a worker that it is not taken, and close the link.
+    WorkerRefused {
+        /// The worker.
+        worker: WorkerId,
+        /// Why.
+        refusal: WorkerRefusal,
+    },
+    /// Send a tile to a worker.
+    Lease {
+        /// The worker.
+        worker: WorkerId,
+        /// The tile.
+        lease: Lease,
+    },
+    /// Tell a worker, where it can be reached, to stop rendering a tile and to
+    /// forget blocks of it that were not acknowledged.
+    Revoke {
+        /// The worker.
+        worker: WorkerId,
+        /// The attempt, which is dead already.
+        attempt: AttemptId,
+        /// Why.
+        reason: RevokeReason,
+    },
+    /// Tell a worker, where it can be reached, that a block is durable.
+    Ack {
+        /// The worker.
+        worker: WorkerId,
+        /// The attempt it was sent under.
+        attempt: AttemptId,
+        /// The block.
+        rect: Rect,
+    },
+    /// Tell a worker, where it can be reached, that a block counts for nothing.
+    RefuseBlock {
+        /// The worker.
+        worker: WorkerId,
+        /// The block.
+        block: BlockRef,
+        /// Why.
+        refusal: BlockRefusal,
+    },
+    /// Every pixel of an image is durable: encode it, then say [`crate::Event::ImageEncoded`]
+    /// or [`crate::Event::ImageFailed`].
+    Encode {
+        /// The image.
+        image: ImageRef,
+    },
+    /// Remove an image's scratch file and stop encoding it: nobody wants it.
+    DropScratch {
+        /// The image.
+        image: ImageRef,
+    },
+    /// A job was cancelled: remove everything of it but its finished frames.
+    DropJob {
+        /// The job.
+        job: JobId,
+    },
+    /// A job is over; its scene description is needed no more.
+    JobDone {
+        /// The job.
+        job: JobId,
+        /// How it ended.
+        outcome: JobOutcome,
+    },
+    /// A job that is over is no longer in the queries: free what else is kept of it in memory.
+    ForgetJob {
+        /// The job.
+        job: JobId,
+    },
+    /// Something that a query of this job answers has changed. At most one per
+    /// job and event; cheap enough to be passed on each time.
+    JobChanged {
+        /// The job.
+        job: JobId,
+    },
+    /// A worker left or is lost: close its links and free what is kept of it.
+    Forget {
+        /// The worker.
+        worker: WorkerId,
+    },
+}
+
+/// How a job ended.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum JobOutcome {
+    /// Every image is encoded.
+    Finished,
+    /// At least one image failed; the others are encoded.
+    Failed,
+    /// Its user cancelled it.
+    Cancelled,
+}
+
+/// Why an attempt ended that its worker did not end.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum RevokeReason {
+    /// Every pixel of the tile is durable.
+    TileDone,
+    /// The job was cancelled.
+    Cancelled,
+    /// The image failed.
+    ImageFailed,
+    /// No block for longer than the progress limit.
+    NoProgress,
+    /// The attempt was dead before: its worker was away for too long, or it is of another epoch.
+    NotLive,
+}

@@ -1,0 +1,160 @@
+//! What can be asked: snapshots, cheap and without effect.
+
+use alloc::string::String;
+
+use model::{
+    Digest, FrameRange, ImageNumber, JobId, Rect, Revision, Span, SubmissionId, Timestamp, WorkerId,
+};
+
+use crate::JobOutcome;
+
+/// A job, as it stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct JobView<'a> {
+    /// Its number.
+    pub job: JobId,
+    /// The submission it came from.
+    pub submission: SubmissionId,
+    /// What its user calls it.
+    pub name: &'a str,
+    /// Digest of its scene description.
+    pub scene: Digest,
+    /// The renderer revision it is pinned to.
+    pub revision: Revision,
+    /// Its images.
+    pub frames: FrameRange,
+    /// The pixels of each image that are rendered.
+    pub window: Rect,
+    /// Columns and rows of its tiles; the last column and row may be smaller.
+    pub tile_size: (u32, u32),
+    /// Tiles of each image.
+    pub tiles_per_image: u32,
+    /// Whether it is over, and how it ended.
+    pub state: JobState,
+    /// How many images are in which state.
+    pub images: ImageCounts,
+    /// Pixels that are durable; those of images that failed later included.
+    pub pixels_done: u64,
+    /// Pixels of all its images.
+    pub pixels: u64,
+    /// Blocks that are durable.
+    pub blocks_done: u64,
+    /// Blocks that arrived although another attempt's had made all their pixels durable.
+    pub blocks_again: u64,
+    /// Pixels that arrived although another attempt's were durable.
+    pub pixels_again: u64,
+    /// Time that threads took over the blocks that are durable, all together.
+    pub render_time: Span,
+    /// Tiles leased at this moment, second attempts included.
+    pub attempts_live: u32,
+    /// Attempts that failed at their worker or made no progress.
+    pub attempts_failed: u64,
+    /// Attempts whose worker was lost.
+    pub attempts_lost: u64,
+    /// When it was submitted.
+    pub submitted: Timestamp,
+    /// When its first tile was leased.
+    pub started: Option<Timestamp>,
+    /// When it was over.
+    pub ended: Option<Timestamp>,
+}
+
+/// Whether a job is over.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum JobState {
+    /// Images are left to do.
+    Running,
+    /// It is over.
+    Over(JobOutcome),
+}
+
+/// How many of a job's images are in which state.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub struct ImageCounts {
+    /// No tile has been leased yet.
+    pub waiting: u32,
+    /// Being rendered.
+    pub rendering: u32,
+    /// All pixels durable, being encoded.
+    pub encoding: u32,
+    /// In their place.
+    pub encoded: u32,
+    /// Given up.
+    pub failed: u32,
+}
+
+/// How far an image is.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum ImageState {
+    /// No tile has been leased yet.
+    Waiting,
+    /// Tiles are being rendered.
+    Rendering,
+    /// All pixels are durable, and it is being encoded.
+    Encoding,
+    /// In its place.
+    Encoded {
+        /// Its film digest.
+        film: Digest,
+    },
+    /// Given up; [`crate::Sched::failures`] says why.
+    Failed,
+}
+
+/// An image, as it stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct ImageView {
+    /// Which image.
+    pub image: ImageNumber,
+    /// How far it is.
+    pub state: ImageState,
+    /// Pixels that are durable.
+    pub pixels_done: u64,
+    /// Pixels it has.
+    pub pixels: u64,
+}
+
+/// An image that failed.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct ImageFailure {
+    /// Which image.
+    pub image: ImageNumber,
+    /// Why.
+    pub reason: String,
+}
+
+/// A worker, as it stands.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct WorkerView {
+    /// Which process.
+    pub worker: WorkerId,
+    /// Its renderer's revision.
+    pub revision: Revision,
+    /// Its render threads.
+    pub threads: u32,
+    /// Whether it can be reached.
+    pub link: Link,
+    /// How many tiles it wants to hold.
+    pub credit: u32,
+    /// How many it holds.
+    pub attempts: u32,
+    /// When it was last heard of.
+    pub heard: Timestamp,
+    /// When it joined first.
+    pub joined: Timestamp,
+    /// Blocks of its that were made durable.
+    pub blocks: u64,
+    /// Pixels in them.
+    pub pixels: u64,
+    /// Time its threads took over them.
+    pub render_time: Span,
+}
+
+/// Whether a worker can be reached.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Link {
+    /// Its link is open.
+    Open,
+    /// Its link broke; it may come back until its liveness limit.
+    Closed,
+}
