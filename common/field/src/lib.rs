@@ -5,7 +5,21 @@
 //! This crate knows no scene, ray, image or file.
 
 pub mod graph;
+pub mod hash;
+pub mod interval;
+pub mod modulus;
+pub mod noise;
 pub mod op;
+pub mod points;
+pub mod program;
+pub mod simd;
+pub mod surroundings;
 
 pub use graph::{Graph, GraphError, NodeId};
+pub use interval::Interval;
+pub use modulus::{Level, Modulus};
 pub use op::{Basis, Kind, Op};
+pub use points::{BATCH, Points, Scratch};
+pub use program::{CompileError, Program};
+pub use simd::SimdLevel;
+pub use surroundings::{Region, Surroundings};

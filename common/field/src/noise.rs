@@ -1,0 +1,201 @@
+//! Gradient noise over an unbounded lattice, thesis §4.3.
+//!
+//! A coordinate is split into a lattice cell, counted in f64, and an offset
+//! within it in f32: at the Earth's radius the offset still resolves a
+//! nanometre of a one-metre cell. All that follows is 32-bit arithmetic
+//! without branches. Cells are numbered modulo 2³²: the noise repeats every
+//! 4,294,967,296 cells, and nowhere nearer.
+//!
+//! These functions are the definition; the batch kernels of `program` are
+//! loops around them, compiled once per SIMD level.
+
+use crate::hash;
+
+/// No value of the noise is farther from zero. The supremum is 1.0363, between
+/// eight gradients that all point at one place in the cell.
+pub const RANGE: f64 = 1.037;
+
+/// No slope of the noise is greater: a Lipschitz constant, reached at a cell's
+/// centre. The thesis's 2.75 (§5.2.3) is not one.
+pub const SLOPE: f64 = 3.75;
+
+/// A lattice's name: the hash's state after its key.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Lattice(u32);
+
+impl Lattice {
+    pub(crate) const fn new(key: u32) -> Self {
+        Self(hash::start(key))
+    }
+}
+
+/// f_N at `p` over the lattice of `key`, thesis eq. (4.9).
+pub fn noise(key: u32, p: [f64; 3]) -> f64 {
+    let [(x, u), (y, v), (z, w)] = p.map(split);
+    f64::from(value(Lattice::new(key), [x, y, z], [u, v, w]))
+}
+
+/// f_N and its gradient at `p`, thesis eqs. (4.9), (4.10a).
+pub fn noise_gradient(key: u32, p: [f64; 3]) -> (f64, [f64; 3]) {
+    let [(x, u), (y, v), (z, w)] = p.map(split);
+    let (value, gradient) = value_gradient(Lattice::new(key), [x, y, z], [u, v, w]);
+    (f64::from(value), gradient.map(f64::from))
+}
+
+/// The lattice cell of a coordinate, modulo 2³², and the offset within it, in [0, 1].
+///
+/// Beyond 2⁵¹ cells, where f64 has no offsets left, the cell's number is
+/// arbitrary but the same everywhere. The offset of an infinity is NaN.
+#[inline(always)]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the low word is the cell; the offset is meant to be f32"
+)]
+pub(crate) fn split(x: f64) -> (u32, f32) {
+    /// Added to a whole number below 2⁵¹, leaves it in the low bits of the sum.
+    const WHOLE: f64 = 6_755_399_441_055_744.0;
+    let floor = x.floor();
+    ((floor + WHOLE).to_bits() as u32, (x - floor) as f32)
+}
+
+/// 6t⁵ − 15t⁴ + 10t³, the rising half of the kernel's profile: h(t − 1), thesis fig. 4.4.
+#[inline(always)]
+fn fade(t: f32) -> f32 {
+    t * t * t * (t * (t * 6.0 - 15.0) + 10.0)
+}
+
+/// Its derivative, 30t²(t − 1)².
+#[inline(always)]
+fn fade_slope(t: f32) -> f32 {
+    let s = t * (t - 1.0);
+    30.0 * (s * s)
+}
+
+/// The bounds between the three equal parts of a hash's upper thirteen bits.
+const FIRST: i32 = -1365 << 19;
+const THIRD: i32 = 1366 << 19;
+
+/// The product of a lattice point's gradient with the way to it.
+///
+/// The upper thirteen bits of the hash choose which component of the gradient
+/// is zero (2731, 2731 and 2730 parts of 8192), the next two the signs of the others.
+#[inline(always)]
+fn kernel(hash: u32, x: f32, y: f32, z: f32) -> f32 {
+    let axis = hash.cast_signed();
+    let a = if axis < FIRST { y } else { x };
+    let b = if axis < THIRD { z } else { y };
+    flip(a, hash << 13) + flip(b, hash << 14)
+}
+
+/// The gradient of that lattice point.
+#[inline(always)]
+fn direction(hash: u32) -> [f32; 3] {
+    let axis = hash.cast_signed();
+    let a = flip(1.0, hash << 13);
+    let b = flip(1.0, hash << 14);
+    let first = axis < FIRST;
+    let third = axis >= THIRD;
+    let y = if third { b } else { 0.0 };
+    [
+        if first { 0.0 } else { a },
+        if first { a } else { y },
+        if third { 0.0 } else { b },
+    ]
+}
+
+/// `value` with its sign turned where the top bit of `sign` is set.
+#[inline(always)]
+fn flip(value: f32, sign: u32) -> f32 {
+    f32::from_bits(value.to_bits() ^ (sign & 0x8000_0000))
+}
+
+#[inline(always)]
+fn lerp(t: f32, a: f32, b: f32) -> f32 {
+    a + t * (b - a)
+}
+
+/// The hashes of a cell's eight corners; x runs fastest.
+#[inline(always)]
+fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
+    let x0 = hash::absorb(lattice.0, x);
+    let x1 = hash::absorb(lattice.0, x.wrapping_add(1));
+    let (y1, z1) = (y.wrapping_add(1), z.wrapping_add(1));
+    let rows = [
+        hash::absorb(x0, y),
+        hash::absorb(x1, y),
+        hash::absorb(x0, y1),
+        hash::absorb(x1, y1),
+    ];
+    let corner = |row, z| hash::finish_high(hash::absorb(row, z));
+    [
+        corner(rows[0], z),
+        corner(rows[1], z),
+        corner(rows[2], z),
+        corner(rows[3], z),
+        corner(rows[0], z1),
+        corner(rows[1], z1),
+        corner(rows[2], z1),
+        corner(rows[3], z1),
+    ]
+}
+
+/// The noise at an offset within a cell.
+#[inline(always)]
+pub(crate) fn value(lattice: Lattice, cell: [u32; 3], [x, y, z]: [f32; 3]) -> f32 {
+    let h = corners(lattice, cell);
+    let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
+    let (u, v, w) = (fade(x), fade(y), fade(z));
+    let a = lerp(u, kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
+    let b = lerp(u, kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
+    let c = lerp(u, kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
+    let d = lerp(u, kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
+    lerp(w, lerp(v, a, b), lerp(v, c, d))
+}
+
+/// The noise and its gradient at an offset within a cell. The value is that of [`value`] to the bit.
+#[inline(always)]
+pub(crate) fn value_gradient(
+    lattice: Lattice,
+    cell: [u32; 3],
+    [x, y, z]: [f32; 3],
+) -> (f32, [f32; 3]) {
+    let h = corners(lattice, cell);
+    let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
+    let (u, v, w) = (fade(x), fade(y), fade(z));
+    let k = [
+        kernel(h[0], x, y, z),
+        kernel(h[1], x1, y, z),
+        kernel(h[2], x, y1, z),
+        kernel(h[3], x1, y1, z),
+        kernel(h[4], x, y, z1),
+        kernel(h[5], x1, y, z1),
+        kernel(h[6], x, y1, z1),
+        kernel(h[7], x1, y1, z1),
+    ];
+    let a = lerp(u, k[0], k[1]);
+    let b = lerp(u, k[2], k[3]);
+    let c = lerp(u, k[4], k[5]);
+    let d = lerp(u, k[6], k[7]);
+    let (e, f) = (lerp(v, a, b), lerp(v, c, d));
+    let along_x = lerp(
+        w,
+        lerp(v, k[1] - k[0], k[3] - k[2]),
+        lerp(v, k[5] - k[4], k[7] - k[6]),
+    );
+    let along_y = lerp(w, b - a, d - c);
+    let along_z = f - e;
+    let g = h.map(direction);
+    let mean = |i: usize| {
+        lerp(
+            w,
+            lerp(v, lerp(u, g[0][i], g[1][i]), lerp(u, g[2][i], g[3][i])),
+            lerp(v, lerp(u, g[4][i], g[5][i]), lerp(u, g[6][i], g[7][i])),
+        )
+    };
+    let gradient = [
+        mean(0) + fade_slope(x) * along_x,
+        mean(1) + fade_slope(y) * along_y,
+        mean(2) + fade_slope(z) * along_z,
+    ];
+    (lerp(w, e, f), gradient)
+}
