@@ -1,0 +1,218 @@
+//! OpenEXR: one part, every channel of the film, tiles of a strip's height, ZIP.
+//!
+//! Tiles are written row by row from strips, through the `exr` crate's block interface.
+
+use std::collections::HashMap;
+use std::io::BufWriter;
+
+use exr::block::writer::ChunksWriter;
+use exr::block::{BlockIndex, UncompressedBlock};
+use exr::error::Error as ExrError;
+use exr::math::{RoundingMode, Vec2};
+use exr::meta::attribute::{
+    AttributeValue, ChannelDescription, IntegerBounds, LevelMode, LineOrder, SampleType, Text,
+    TileDescription,
+};
+use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
+use exr::meta::{BlockDescription, MetaData};
+use half::f16;
+use model::film::{CHANNEL_COUNT, CHANNELS, Storage};
+use model::rect::GRID_SQUARE;
+use model::{Digest, Rect};
+
+use super::Source;
+use super::publish::Pending;
+use crate::digest::StoredHasher;
+use crate::error::ImageError;
+use crate::read::{FileKind, SampleKind, Window};
+use crate::scratch::Strip;
+
+// The `exr` crate takes samples in the machine's order of bytes, the digest little-endian ones;
+// the same lines serve both.
+const _: () = assert!(
+    cfg!(target_endian = "little"),
+    "frames are written little-endian only"
+);
+
+/// Side of a tile: that of a grid square and the height of a strip.
+const TILE: usize = GRID_SQUARE as usize;
+
+/// Largest finite half; light beyond it is stored as this, never as infinity.
+const HALF_MAX: f32 = 65_504.0;
+
+/// Writes the frame and returns the digest of what it stores.
+pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, ImageError> {
+    let window = source.scratch.window();
+    let channels = sorted_channels();
+    let mut hasher = StoredHasher::new(FileKind::Exr, 1);
+    hasher.part(
+        "",
+        Window::of(window),
+        Window::of(source.scratch.identity().resolution.rect()),
+        channels
+            .iter()
+            .map(|index| (CHANNELS[*index].name, sample_kind(*index))),
+    );
+    let mut out = BufWriter::with_capacity(1 << 16, pending.file());
+    // An error of ours has to pass through the crate's closure, which knows its own only.
+    let mut ours = None;
+    exr::block::write(
+        &mut out,
+        [header(source, &channels)].into_iter().collect(),
+        true,
+        |meta, chunks| {
+            let result = source.scratch.for_each_strip(|strip| {
+                let lines = encode(strip, &channels);
+                lines.iter().for_each(|line| hasher.samples(line));
+                write_tiles(window, strip.rows().start, &lines, &meta, chunks)
+                    .map_err(|error| refused(pending, error))
+            });
+            result.map_err(|error| {
+                ours = Some(error);
+                ExrError::Aborted
+            })
+        },
+    )
+    .map_err(|error| ours.take().unwrap_or_else(|| refused(pending, error)))?;
+    Ok(hasher.finish())
+}
+
+/// Compresses and writes the tiles of one strip.
+fn write_tiles(
+    window: Rect,
+    y: u32,
+    lines: &[Vec<u8>],
+    meta: &MetaData,
+    chunks: &mut impl ChunksWriter,
+) -> Result<(), ExrError> {
+    let width = window.width() as usize;
+    let height = lines.len() / CHANNEL_COUNT;
+    let columns = width.div_ceil(TILE);
+    let y = (y - window.y0) as usize;
+    let mut compressor = chunks.sequential_blocks_compressor(meta);
+    for column in 0..columns {
+        let x = column * TILE;
+        let tile_width = TILE.min(width - x);
+        let mut data = Vec::new();
+        for line in lines {
+            let bytes = line.len() / width;
+            data.extend_from_slice(&line[x * bytes..(x + tile_width) * bytes]);
+        }
+        let index = BlockIndex {
+            layer: 0,
+            pixel_position: Vec2(x, y),
+            pixel_size: Vec2(tile_width, height),
+            level: Vec2(0, 0),
+        };
+        compressor.compress_block(
+            y / TILE * columns + column,
+            UncompressedBlock { index, data },
+        )?;
+    }
+    Ok(())
+}
+
+/// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
+fn encode(strip: &Strip, channels: &[usize; CHANNEL_COUNT]) -> Vec<Vec<u8>> {
+    let line = |y: u32, channel: usize| {
+        let row = strip.row(channel, y);
+        match CHANNELS[channel].storage {
+            Storage::Half => row.iter().flat_map(|v| to_half(*v).to_le_bytes()).collect(),
+            Storage::Float => row.iter().flat_map(|v| v.to_le_bytes()).collect(),
+        }
+    };
+    strip
+        .rows()
+        .flat_map(|y| channels.iter().map(move |channel| line(y, *channel)))
+        .collect()
+}
+
+/// The nearest half, the largest finite one for what lies beyond.
+fn to_half(value: f32) -> f16 {
+    f16::from_f32(value.clamp(-HALF_MAX, HALF_MAX))
+}
+
+/// The film's channels in the order of the file, which is that of their names.
+fn sorted_channels() -> [usize; CHANNEL_COUNT] {
+    let mut channels = std::array::from_fn(|index| index);
+    channels.sort_by_key(|index: &usize| CHANNELS[*index].name);
+    channels
+}
+
+fn sample_kind(channel: usize) -> SampleKind {
+    match CHANNELS[channel].storage {
+        Storage::Half => SampleKind::F16,
+        Storage::Float => SampleKind::F32,
+    }
+}
+
+fn header(source: &Source<'_>, channels: &[usize; CHANNEL_COUNT]) -> Header {
+    let window = source.scratch.window();
+    let size = |rect: Rect| Vec2(rect.width() as usize, rect.height() as usize);
+    let place = |at: u32| i32::try_from(at).expect("a side is at most 65,536 pixels");
+    let whole = source.scratch.identity().resolution.rect();
+    let descriptions = channels.iter().map(|index| {
+        let sample_type = match CHANNELS[*index].storage {
+            Storage::Half => SampleType::F16,
+            Storage::Float => SampleType::F32,
+        };
+        ChannelDescription::named(text(CHANNELS[*index].name), sample_type)
+    });
+    let metadata = &source.request.metadata;
+    let attributes = LayerAttributes {
+        layer_name: None,
+        layer_position: Vec2(place(window.x0), place(window.y0)),
+        software_name: Some(text(&metadata.software)),
+        comments: (!metadata.comments.is_empty()).then(|| text(&metadata.comments)),
+        frames_per_second: metadata.rate(),
+        other: metadata
+            .texts(source.film_digest)
+            .into_iter()
+            .map(|(name, value)| (text(name), AttributeValue::Text(text(&value))))
+            .collect::<HashMap<_, _>>(),
+        ..LayerAttributes::default()
+    };
+    Header::new(text("film"), size(window), descriptions.collect())
+        .with_attributes(attributes)
+        .with_shared_attributes(ImageAttributes::new(IntegerBounds::new(
+            (0, 0),
+            size(whole),
+        )))
+        .with_encoding(
+            exr::compression::Compression::ZIP16,
+            BlockDescription::Tiles(TileDescription {
+                tile_size: Vec2(TILE, TILE),
+                level_mode: LevelMode::Singular,
+                rounding_mode: RoundingMode::Down,
+            }),
+            LineOrder::Increasing,
+        )
+}
+
+/// A text as UTF-8, which is how programs of today read EXR's bytes.
+fn text(text: &str) -> Text {
+    Text::from_slice_unchecked(text.as_bytes())
+}
+
+fn refused(pending: &Pending, error: ExrError) -> ImageError {
+    match error {
+        ExrError::Io(source) => ImageError::io("write", pending.target(), source),
+        other => ImageError::Encode {
+            path: pending.target().to_owned(),
+            source: other.into(),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn light_beyond_a_half_is_never_infinite() {
+        assert_eq!(to_half(1e30), f16::MAX);
+        assert_eq!(to_half(-1e30), f16::MIN);
+        assert_eq!(to_half(65_519.0), f16::MAX);
+        assert_eq!(to_half(0.18).to_f32(), 0.180_053_71);
+    }
+}

@@ -1,0 +1,149 @@
+//! PNG of 8 or 16 bits, RGB, sRGB, without alpha: the film's colour is premultiplied over black,
+//! which is what a viewer should see, sky (alpha 0) included.
+
+use std::io::{BufWriter, Write};
+
+use model::{Digest, Rect};
+use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
+
+use super::Source;
+use super::publish::Pending;
+use crate::digest::StoredHasher;
+use crate::error::ImageError;
+use crate::read::{FileKind, SampleKind, Window};
+use crate::scratch::Strip;
+use crate::view::Display;
+
+/// Bits of one sample.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(super) enum Depth {
+    Eight,
+    Sixteen,
+}
+
+impl Depth {
+    fn top(self) -> u16 {
+        match self {
+            Self::Eight => 255,
+            Self::Sixteen => 65_535,
+        }
+    }
+
+    /// One row of a strip as R, G, B per pixel; 16 bits big-endian.
+    pub(super) fn encode(self, strip: &Strip, y: u32, display: &Display, row: &mut Vec<u8>) {
+        let [red, green, blue] = [0, 1, 2].map(|channel| strip.row(channel, y));
+        row.clear();
+        for ((red, green), blue) in red.iter().zip(green).zip(blue) {
+            for code in display.codes([*red, *green, *blue]) {
+                let bytes = code.to_be_bytes();
+                match self {
+                    Self::Eight => row.push(bytes[1]),
+                    Self::Sixteen => row.extend(bytes),
+                }
+            }
+        }
+    }
+}
+
+/// Writes the frame and returns the digest of what it stores.
+pub(super) fn write(
+    source: &Source<'_>,
+    pending: &Pending,
+    depth: Depth,
+) -> Result<Digest, ImageError> {
+    let failed = |error| refused(pending, error);
+    let window = source.scratch.window();
+    let display = source.request.view.prepare(depth.top());
+    let mut hasher = StoredHasher::new(FileKind::Png, 1);
+    hash_head(&mut hasher, window, depth);
+    let out = BufWriter::with_capacity(1 << 16, pending.file());
+    let encoder = describe(
+        source,
+        Encoder::new(out, window.width(), window.height()),
+        depth,
+    );
+    let mut writer = encoder.and_then(Encoder::write_header).map_err(failed)?;
+    let mut stream = writer.stream_writer().map_err(failed)?;
+    let mut row = Vec::new();
+    source.scratch.for_each_strip(|strip| {
+        for y in strip.rows() {
+            depth.encode(strip, y, &display, &mut row);
+            hash_row(&mut hasher, &row, depth);
+            stream
+                .write_all(&row)
+                .map_err(|error| ImageError::io("write", pending.target(), error))?;
+        }
+        Ok(())
+    })?;
+    stream.finish().map_err(failed)?;
+    writer.finish().map_err(failed)?;
+    Ok(hasher.finish())
+}
+
+/// Depth, colour space and metadata.
+fn describe<W: Write>(
+    source: &Source<'_>,
+    mut encoder: Encoder<'static, W>,
+    depth: Depth,
+) -> Result<Encoder<'static, W>, EncodingError> {
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(match depth {
+        Depth::Eight => BitDepth::Eight,
+        Depth::Sixteen => BitDepth::Sixteen,
+    });
+    encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
+    let metadata = &source.request.metadata;
+    for (name, text) in metadata.texts(source.film_digest) {
+        encoder.add_itxt_chunk(name.to_owned(), text)?;
+    }
+    encoder.add_itxt_chunk("Software".to_owned(), metadata.software.clone())?;
+    let rate = metadata.frames_per_second.to_string();
+    encoder.add_itxt_chunk("framesPerSecond".to_owned(), rate)?;
+    if !metadata.comments.is_empty() {
+        encoder.add_itxt_chunk("Comment".to_owned(), metadata.comments.clone())?;
+    }
+    Ok(encoder)
+}
+
+fn refused(pending: &Pending, error: EncodingError) -> ImageError {
+    match error {
+        EncodingError::IoError(source) => ImageError::io("write", pending.target(), source),
+        other => ImageError::Encode {
+            path: pending.target().to_owned(),
+            source: other.into(),
+        },
+    }
+}
+
+/// Begins the only part of a PNG or PPM in the digest of stored values.
+pub(super) fn hash_head(hasher: &mut StoredHasher, window: Rect, depth: Depth) {
+    let size = Window {
+        x: 0,
+        y: 0,
+        width: window.width(),
+        height: window.height(),
+    };
+    let kind = match depth {
+        Depth::Eight => SampleKind::U8,
+        Depth::Sixteen => SampleKind::U16,
+    };
+    // Sorted by name, like every part's channels.
+    let channels = ["B", "G", "R"].map(|name| (name, kind));
+    hasher.part("", size, size, channels.into_iter());
+}
+
+/// Takes a row of interleaved R, G, B into the digest of stored values.
+pub(super) fn hash_row(hasher: &mut StoredHasher, row: &[u8], depth: Depth) {
+    let bytes = match depth {
+        Depth::Eight => 1,
+        Depth::Sixteen => 2,
+    };
+    for channel in [2, 1, 0] {
+        let samples: Vec<u8> = row
+            .chunks_exact(3 * bytes)
+            .flat_map(|pixel| pixel[channel * bytes..(channel + 1) * bytes].iter().rev())
+            .copied()
+            .collect();
+        hasher.samples(&samples);
+    }
+}

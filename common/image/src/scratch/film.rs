@@ -1,0 +1,48 @@
+//! The film digest: the name of an image's pixels before any file format touched them.
+
+use model::film::{CHANNEL_COUNT, CHANNELS};
+use model::{Digest, Rect};
+
+use super::Scratch;
+use crate::error::ImageError;
+
+/// Rises when what the digest is taken over changes.
+const FILM_DIGEST_VERSION: u32 = 1;
+
+impl Scratch {
+    /// BLAKE3 (derive-key, context `flyby film v1`) of the finished film: the version, the
+    /// window's corners x0 y0 x1 y1, the number of channels and each name after its length, all
+    /// numbers `u32` little-endian; then for each row of the window, for each channel, the row's
+    /// `f32` little-endian, with −0 made +0.
+    ///
+    /// It does not depend on tiling, order or interruptions. Fails if pixels are missing or the
+    /// file cannot be read. Holds a strip of 32 rows in memory.
+    pub fn film_digest(&self) -> Result<Digest, ImageError> {
+        let mut hasher = blake3::Hasher::new_derive_key("flyby film v1");
+        let mut number = |value: u32| {
+            hasher.update(&value.to_le_bytes());
+        };
+        number(FILM_DIGEST_VERSION);
+        let Rect { x0, y0, x1, y1 } = self.window();
+        [x0, y0, x1, y1].into_iter().for_each(&mut number);
+        number(u32::try_from(CHANNEL_COUNT).expect("a handful of channels"));
+        for channel in CHANNELS {
+            let length = u32::try_from(channel.name.len()).expect("a short name");
+            hasher.update(&length.to_le_bytes());
+            hasher.update(channel.name.as_bytes());
+        }
+        let mut bytes = Vec::new();
+        self.for_each_strip(|strip| {
+            for y in strip.rows() {
+                bytes.clear();
+                for channel in 0..CHANNEL_COUNT {
+                    let row = strip.row(channel, y);
+                    bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+                }
+                hasher.update(&bytes);
+            }
+            Ok(())
+        })?;
+        Ok(Digest(*hasher.finalize().as_bytes()))
+    }
+}

@@ -1,0 +1,381 @@
+//! The scratch file of one image: where its blocks come together.
+//!
+//! One fixed slot per grid square that the window touches, in row order, so that a block is
+//! written at its place in whatever order it comes; the file is sparse until then. What is done
+//! is counted in pixels, so that the rest of an image may be cut into other tiles at any time.
+//! A journal beside the file lets an interrupted render go on.
+
+mod coverage;
+mod film;
+mod grid;
+mod header;
+mod journal;
+mod lock;
+mod strip;
+
+use std::fs::File;
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use model::film::CHANNELS;
+use model::{Digest, Rect, rect::SIDE_MAX};
+
+use self::coverage::Coverage;
+use self::grid::{Grid, SLOT_BYTES};
+use self::header::USED_BYTES;
+use self::journal::{Entry, Journal};
+use crate::error::ImageError;
+
+pub use self::header::ScratchIdentity;
+pub(crate) use self::strip::Strip;
+
+/// Locks over the slots, so that blocks of one square do not undo each other.
+const SLOT_LOCKS: usize = 16;
+
+/// What [`Scratch::open_or_create`] found.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Opened {
+    /// Nothing was there.
+    New,
+    /// This image, interrupted: its pixels that could be read back whole are done.
+    Resumed {
+        /// Pixels that need not be rendered again.
+        pixels_done: u64,
+        /// Journalled blocks whose pixels did not outlive the interruption.
+        blocks_lost: u64,
+    },
+    /// The scratch file of another scene, revision, image, size or window: it was begun anew.
+    StartedAnew,
+}
+
+/// The scratch file of one image, shared by the threads that deliver its blocks.
+///
+/// While it lives it holds a lock on the file, so that no other process writes to it.
+#[derive(Debug)]
+pub struct Scratch {
+    path: PathBuf,
+    file: File,
+    identity: ScratchIdentity,
+    grid: Grid,
+    slots: [Mutex<()>; SLOT_LOCKS],
+    state: Mutex<State>,
+}
+
+#[derive(Debug)]
+struct State {
+    coverage: Coverage,
+    journal: Journal,
+}
+
+impl Scratch {
+    /// Begins the scratch file of an image anew at `path`, whatever an earlier one held, with its
+    /// journal at `path` + `.journal`.
+    ///
+    /// Fails if another process holds it, if a file that is no scratch file is in its place, if
+    /// `window` is empty or leaves the image, or if the system refuses.
+    pub fn create(
+        path: impl Into<PathBuf>,
+        identity: ScratchIdentity,
+        window: Rect,
+    ) -> Result<Self, ImageError> {
+        let path = path.into();
+        let (file, _) = open(&path, &identity, window)?;
+        Self::begin(path, file, identity, window)
+    }
+
+    /// Goes on with the scratch file at `path` if it is this image's, else begins it.
+    ///
+    /// Every block in the journal is read back, and counts as done only if its digest still
+    /// holds. Fails like [`Scratch::create`].
+    pub fn open_or_create(
+        path: impl Into<PathBuf>,
+        identity: ScratchIdentity,
+        window: Rect,
+    ) -> Result<(Self, Opened), ImageError> {
+        let path = path.into();
+        let (file, found) = open(&path, &identity, window)?;
+        if found == Found::This {
+            let bytes = Grid::new(window).file_bytes();
+            file.set_len(bytes)
+                .map_err(|source| ImageError::io("size the scratch file", &path, source))?;
+            return Self::resume(path, file, identity, window);
+        }
+        let opened = match found {
+            Found::Nothing | Found::This => Opened::New,
+            Found::Other => Opened::StartedAnew,
+        };
+        Ok((Self::begin(path, file, identity, window)?, opened))
+    }
+
+    fn begin(
+        path: PathBuf,
+        file: File,
+        identity: ScratchIdentity,
+        window: Rect,
+    ) -> Result<Self, ImageError> {
+        let grid = Grid::new(window);
+        let header = identity.header(window);
+        file.set_len(0)
+            .and_then(|()| file.write_all_at(&header, 0))
+            .and_then(|()| file.set_len(grid.file_bytes()))
+            .map_err(|source| ImageError::io("begin the scratch file", &path, source))?;
+        let journal = Journal::start(journal_path(&path), header::binding(&header))?;
+        Ok(Self::assemble(path, file, identity, grid, journal))
+    }
+
+    fn resume(
+        path: PathBuf,
+        file: File,
+        identity: ScratchIdentity,
+        window: Rect,
+    ) -> Result<(Self, Opened), ImageError> {
+        let grid = Grid::new(window);
+        let binding = header::binding(&identity.header(window));
+        let mut coverage = Coverage::new(grid);
+        let mut blocks_lost = 0;
+        let (mut slot, mut payload) = (vec![0; SLOT_BYTES], Vec::new());
+        let journal = Journal::replay(journal_path(&path), binding, |Entry { block, digest }| {
+            if !block.is_block() || !window.contains(block) {
+                blocks_lost += 1;
+                return Ok(());
+            }
+            let offset = grid.slot_offset(grid.square_of(block));
+            file.read_exact_at(&mut slot, offset)
+                .map_err(|source| ImageError::io("read back", &path, source))?;
+            grid::gather(block, &slot, &mut payload);
+            if payload_digest(&payload) == digest {
+                coverage.add(block);
+            } else {
+                blocks_lost += 1;
+            }
+            Ok(())
+        })?;
+        let Some(journal) = journal else {
+            return Ok((Self::begin(path, file, identity, window)?, Opened::New));
+        };
+        let pixels_done = coverage.done();
+        let scratch = Self::assemble(path, file, identity, grid, journal);
+        scratch.state().coverage = coverage;
+        let opened = Opened::Resumed {
+            pixels_done,
+            blocks_lost,
+        };
+        Ok((scratch, opened))
+    }
+
+    fn assemble(
+        path: PathBuf,
+        file: File,
+        identity: ScratchIdentity,
+        grid: Grid,
+        journal: Journal,
+    ) -> Self {
+        Self {
+            path,
+            file,
+            identity,
+            grid,
+            slots: Default::default(),
+            state: Mutex::new(State {
+                coverage: Coverage::new(grid),
+                journal,
+            }),
+        }
+    }
+
+    /// Writes a block at its place and counts its pixels as done.
+    ///
+    /// `payload` is, for each channel of [`CHANNELS`], for each row, for each column, an `f32`,
+    /// little-endian. A block that is done already is not written again; one that overlaps what
+    /// is done must agree with it, which is not checked here. May be called from many threads.
+    ///
+    /// Fails, and counts nothing, if `block` is no block of the window, if the payload has
+    /// another length or holds a NaN or an infinity, or if the system refuses. Durable only
+    /// after [`Scratch::sync`].
+    pub fn write_block(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
+        self.check(block, payload)?;
+        if self.state().coverage.contains(block) {
+            return Ok(());
+        }
+        self.write_slot(block, payload)
+            .map_err(|source| ImageError::io("write a block to", &self.path, source))?;
+        let digest = payload_digest(payload);
+        let mut state = self.state();
+        state.journal.append(Entry { block, digest })?;
+        state.coverage.add(block);
+        Ok(())
+    }
+
+    fn check(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
+        let window = self.window();
+        if !block.is_block() || !window.contains(block) {
+            return Err(ImageError::NotABlock {
+                rect: block,
+                window,
+            });
+        }
+        let expected = grid::payload_bytes(block);
+        if payload.len() != expected {
+            return Err(ImageError::PayloadLength {
+                rect: block,
+                expected,
+                found: payload.len(),
+            });
+        }
+        let values = payload
+            .chunks_exact(4)
+            .map(|bytes| f32::from_le_bytes(bytes.try_into().expect("four bytes")));
+        match values.enumerate().find(|(_, value)| !value.is_finite()) {
+            None => Ok(()),
+            Some((index, value)) => Err(not_finite(block, index, value)),
+        }
+    }
+
+    /// Writes into the slot of the block's square, the slot as one piece.
+    fn write_slot(&self, block: Rect, payload: &[u8]) -> std::io::Result<()> {
+        let square = self.grid.square_of(block);
+        let offset = self.grid.slot_offset(square);
+        let _slot = lock(&self.slots[square % SLOT_LOCKS]);
+        if payload.len() == SLOT_BYTES {
+            return self.file.write_all_at(payload, offset);
+        }
+        let mut slot = vec![0; SLOT_BYTES];
+        if block != self.grid.whole_block(square) {
+            self.file.read_exact_at(&mut slot, offset)?;
+        }
+        grid::scatter(block, payload, &mut slot);
+        self.file.write_all_at(&slot, offset)
+    }
+
+    /// Makes every block written so far durable: pixels, journal, and the files' names.
+    pub fn sync(&self) -> Result<(), ImageError> {
+        self.file
+            .sync_data()
+            .map_err(|source| ImageError::io("sync", &self.path, source))?;
+        self.state().journal.sync()?;
+        crate::frame::publish::sync_folder_of(&self.path)
+    }
+
+    /// What is not done: whole blocks of the window, or the missing parts of those begun.
+    pub fn remaining(&self) -> Vec<Rect> {
+        self.state().coverage.missing()
+    }
+
+    /// Number of pixels of the window that are done, each counted once.
+    pub fn pixels_done(&self) -> u64 {
+        self.state().coverage.done()
+    }
+
+    /// Whether every pixel of the window is done.
+    pub fn is_complete(&self) -> bool {
+        self.pixels_done() == self.window().area()
+    }
+
+    /// The part of the image that is rendered and stored.
+    pub fn window(&self) -> Rect {
+        self.grid.window()
+    }
+
+    /// What image this is.
+    pub fn identity(&self) -> &ScratchIdentity {
+        &self.identity
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Removes the scratch file and its journal.
+    pub fn discard(self) -> Result<(), ImageError> {
+        let state = self.state();
+        for path in [self.path.as_path(), state.journal.path()] {
+            std::fs::remove_file(path).map_err(|source| ImageError::io("remove", path, source))?;
+        }
+        Ok(())
+    }
+
+    /// Fails unless every pixel is done.
+    pub(crate) fn require_complete(&self) -> Result<(), ImageError> {
+        match self.window().area() - self.pixels_done() {
+            0 => Ok(()),
+            missing => Err(ImageError::Incomplete {
+                path: self.path.clone(),
+                missing,
+            }),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        lock(&self.state)
+    }
+}
+
+/// What stands at a scratch file's place.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Found {
+    Nothing,
+    This,
+    Other,
+}
+
+/// Opens and locks the file and says whose it is, changing nothing of it.
+fn open(
+    path: &Path,
+    identity: &ScratchIdentity,
+    window: Rect,
+) -> Result<(File, Found), ImageError> {
+    let resolution = identity.resolution;
+    let sides_fit = resolution.width <= SIDE_MAX && resolution.height <= SIDE_MAX;
+    if !sides_fit || window.is_empty() || !resolution.rect().contains(window) {
+        return Err(ImageError::BadWindow { window, resolution });
+    }
+    let file = lock::open_locked(path)?;
+    let mut first = [0; USED_BYTES];
+    let read = lock::read_up_to(&file, &mut first)
+        .map_err(|source| ImageError::io("read", path, source))?;
+    if !header::is_ours(&first[..read]) {
+        return Err(ImageError::NotAScratch {
+            path: path.to_owned(),
+        });
+    }
+    let found = if first == identity.header(window) {
+        Found::This
+    } else if first[..read].iter().all(|byte| *byte == 0) {
+        Found::Nothing
+    } else {
+        Found::Other
+    };
+    Ok((file, found))
+}
+
+fn journal_path(path: &Path) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".journal");
+    name.into()
+}
+
+fn payload_digest(payload: &[u8]) -> Digest {
+    Digest(*blake3::hash(payload).as_bytes())
+}
+
+/// The error for sample `index` of a block's payload.
+fn not_finite(block: Rect, index: usize, value: f32) -> ImageError {
+    let (width, height) = (block.width() as usize, block.height() as usize);
+    let within = |offset: usize| u32::try_from(offset).expect("a block's sides are at most 32");
+    ImageError::NotFinite {
+        channel: CHANNELS[index / (width * height)].name,
+        x: block.x0 + within(index % width),
+        y: block.y0 + within(index / width % height),
+        value,
+    }
+}
+
+/// A lock survives a panic elsewhere: what it guards is changed in single steps.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests;

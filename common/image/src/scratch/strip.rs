@@ -1,0 +1,100 @@
+//! Reading a finished scratch file in strips of rows.
+
+use std::ops::Range;
+use std::os::unix::fs::FileExt;
+
+use model::Rect;
+use model::film::CHANNEL_COUNT;
+use model::rect::GRID_SQUARE;
+
+use super::Scratch;
+use super::grid::SLOT_BYTES;
+use crate::error::ImageError;
+
+/// Rows of a strip; the last one of a window may have fewer.
+pub(crate) const STRIP_ROWS: u32 = GRID_SQUARE;
+
+/// Some rows of a window, every channel; −0 has become +0.
+#[derive(Debug)]
+pub(crate) struct Strip {
+    /// The pixels, in the whole image.
+    rect: Rect,
+    /// `[channel][row][column]`.
+    samples: Vec<f32>,
+}
+
+impl Strip {
+    /// Its rows, in the whole image.
+    pub(crate) fn rows(&self) -> Range<u32> {
+        self.rect.y0..self.rect.y1
+    }
+
+    /// One row of one channel, from the window's left to its right.
+    pub(crate) fn row(&self, channel: usize, y: u32) -> &[f32] {
+        &self.samples[self.place(channel, y)]
+    }
+
+    fn place(&self, channel: usize, y: u32) -> Range<usize> {
+        let (width, height) = (self.rect.width() as usize, self.rect.height() as usize);
+        let from = (channel * height + (y - self.rect.y0) as usize) * width;
+        from..from + width
+    }
+}
+
+impl Scratch {
+    /// Hands the window to `each` strip by strip from its top, [`STRIP_ROWS`] rows at a time.
+    ///
+    /// Fails if pixels are missing, if the system refuses, or with what `each` fails with.
+    pub(crate) fn for_each_strip(
+        &self,
+        mut each: impl FnMut(&Strip) -> Result<(), ImageError>,
+    ) -> Result<(), ImageError> {
+        self.require_complete()?;
+        let window = self.window();
+        let mut slot = vec![0; SLOT_BYTES];
+        let mut strip = Strip {
+            rect: window,
+            samples: Vec::new(),
+        };
+        for y0 in (window.y0..window.y1).step_by(STRIP_ROWS as usize) {
+            strip.rect = Rect {
+                y0,
+                y1: window.y1.min(y0 + STRIP_ROWS),
+                ..window
+            };
+            strip.samples.resize(
+                CHANNEL_COUNT * strip.rect.width() as usize * strip.rect.height() as usize,
+                0.0,
+            );
+            for block in strip.rect.blocks() {
+                self.fill(&mut strip, block, &mut slot)?;
+            }
+            each(&strip)?;
+        }
+        Ok(())
+    }
+
+    /// Copies one block into its place in the strip.
+    fn fill(&self, strip: &mut Strip, block: Rect, slot: &mut [u8]) -> Result<(), ImageError> {
+        let square = self.grid.square_of(block);
+        self.file
+            .read_exact_at(slot, self.grid.slot_offset(square))
+            .map_err(|source| ImageError::io("read a block of", &self.path, source))?;
+        let side = GRID_SQUARE as usize;
+        let in_strip = (block.x0 - strip.rect.x0) as usize;
+        let in_slot = (block.x0 % GRID_SQUARE) as usize;
+        let width = block.width() as usize;
+        for channel in 0..CHANNEL_COUNT {
+            for y in block.y0..block.y1 {
+                let from = ((channel * side + (y % GRID_SQUARE) as usize) * side + in_slot) * 4;
+                let row = strip.place(channel, y);
+                let to = &mut strip.samples[row][in_strip..in_strip + width];
+                for (sample, bytes) in to.iter_mut().zip(slot[from..].chunks_exact(4)) {
+                    let value = f32::from_le_bytes(bytes.try_into().expect("four bytes"));
+                    *sample = if value == 0.0 { 0.0 } else { value };
+                }
+            }
+        }
+        Ok(())
+    }
+}
