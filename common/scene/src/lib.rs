@@ -3,8 +3,17 @@
 //! A scene file becomes a [`Description`] once, where it is submitted. Everyone
 //! else only ever sees the description.
 
+mod bytes;
+mod camera;
+mod canonical;
 pub mod curve;
 pub mod description;
+pub mod rules;
+mod spline;
+mod sun;
+mod vector;
 
+pub use bytes::{BYTES_MAX, NotAScene, NotWritable, digest_of};
+pub use camera::{Flight, Pose};
 pub use curve::Curve;
 pub use description::Description;
