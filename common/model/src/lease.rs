@@ -31,7 +31,7 @@ impl Lease {
     }
 }
 
-/// How far a worker is with a tile that it renders.
+/// How far a worker is with a tile that it has started.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Running {
     /// The attempt.

@@ -83,11 +83,12 @@ pub enum Event {
         /// The number; at most [`crate::Limits::credit_max`] counts.
         credit: u32,
     },
-    /// A worker is alive, and renders these.
+    /// A worker is alive, and at work on these.
     Heartbeat {
         /// The worker.
         worker: WorkerId,
-        /// What it renders, and how far it is. An attempt held ahead is not named.
+        /// What it has started, and how far it is: those that it renders, and those
+        /// of which blocks are still to be delivered. An attempt held ahead is not named.
         running: Vec<Running>,
     },
     /// A worker will not render these tiles.

@@ -16,12 +16,24 @@
 
 extern crate alloc;
 
+mod attempt;
+mod attempts;
 mod config;
 mod effect;
 mod event;
+mod invariants;
+mod job;
+mod jobs;
+mod links;
+mod market;
+mod pixels;
 mod refusal;
 mod sched;
+mod tiling;
+mod timers;
 mod view;
+mod work;
+mod worker;
 
 pub use config::{Config, Limits};
 pub use effect::{Effect, JobOutcome, RevokeReason};

@@ -1,85 +1,207 @@
-//! The scheduler itself.
+//! The scheduler itself: its state, its one door, and what can be asked of it.
 
+use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
 use alloc::vec::Vec;
 
-use model::{AttemptId, ImageRef, JobId, Timestamp, WorkerId};
+use model::{AttemptId, ImageRef, JobId, Rect, SubmissionId, Timestamp, WorkerId};
 
+use crate::attempt::{Attempt, is_block_of};
+use crate::job::Job;
+use crate::market::Market;
+use crate::timers::Timers;
+use crate::worker::Worker;
 use crate::{
-    BlockRef, Config, Effect, Event, ImageFailure, ImageView, JobView, Verdict, WorkerView,
+    BlockRef, BlockRefusal, Config, Effect, Event, ImageFailure, ImageView, JobView, Verdict,
+    WorkerView,
 };
 
 /// The state of the farm.
+///
+/// An event costs the logarithm of how many jobs, workers and attempts there
+/// are; what ends a whole image, job or worker costs as much as that holds.
 #[derive(Clone, Debug)]
 pub struct Sched {
-    config: Config,
+    pub(crate) config: Config,
+    /// The latest time that was told.
+    pub(crate) now: Timestamp,
+    pub(crate) jobs: BTreeMap<JobId, Job>,
+    pub(crate) submissions: BTreeMap<SubmissionId, JobId>,
+    pub(crate) jobs_made: u64,
+    /// Jobs that are over, in the order in which they ended.
+    pub(crate) over: VecDeque<JobId>,
+    /// Images of all jobs that are remembered.
+    pub(crate) images: u32,
+    pub(crate) workers: BTreeMap<WorkerId, Worker>,
+    /// Live attempts by number.
+    pub(crate) attempts: BTreeMap<u64, Attempt>,
+    pub(crate) attempts_made: u64,
+    pub(crate) timers: Timers,
+    pub(crate) market: Market,
+    /// Jobs that this event changed.
+    pub(crate) changed: BTreeSet<JobId>,
 }
 
 impl Sched {
     /// A farm without jobs or workers.
     pub fn new(config: Config) -> Self {
-        Self { config }
+        Self {
+            config,
+            now: Timestamp::default(),
+            jobs: BTreeMap::new(),
+            submissions: BTreeMap::new(),
+            jobs_made: 0,
+            over: VecDeque::new(),
+            images: 0,
+            workers: BTreeMap::new(),
+            attempts: BTreeMap::new(),
+            attempts_made: 0,
+            timers: Timers::default(),
+            market: Market::default(),
+            changed: BTreeSet::new(),
+        }
     }
 
     /// Applies one event and appends to `out` what the shell must now do.
+    ///
+    /// `now` may not decrease; where it does, the latest time told before holds.
     pub fn handle(&mut self, now: Timestamp, event: Event, out: &mut Vec<Effect>) {
-        let _ = (now, event, out, &self.config);
+        self.now = self.now.max(now);
+        match event {
+            Event::Submit(submission) => self.submit(submission, out),
+            Event::BlockStored {
+                worker,
+                block,
+                elapsed,
+            } => self.block_stored(worker, block, elapsed, out),
+            Event::TileFailed {
+                worker,
+                attempt,
+                reason,
+            } => self.tile_failed(worker, attempt, reason, out),
+            Event::ImageEncoded { image, film } => self.image_encoded(image, film, out),
+            Event::ImageFailed { image, reason } => self.image_failed(image, reason, out),
+            Event::Cancel { job } => self.cancel(job, out),
+            Event::WorkerJoined {
+                worker,
+                link,
+                revision,
+                threads,
+                held,
+            } => self.worker_joined(worker, (link, revision, threads), &held, out),
+            Event::Credit { worker, credit } => self.credit(worker, credit),
+            Event::Heartbeat { worker, running } => self.heartbeat(worker, &running, out),
+            Event::GivenBack { worker, attempts } => self.given_back(worker, &attempts),
+            Event::LinkClosed { worker, link } => self.link_closed(worker, link),
+            Event::Goodbye { worker } => self.goodbye(worker, out),
+            Event::Tick => self.tick(out),
+        }
+        self.lease_all(out);
+        while let Some(job) = self.changed.pop_first() {
+            out.push(Effect::JobChanged { job });
+        }
     }
 
     /// When an [`Event::Tick`] is next worth sending; `None` while nothing is pending.
     pub fn next_deadline(&self) -> Option<Timestamp> {
-        None
+        self.timers.next()
     }
 
     /// What to do with a block that `worker` sent; asked before it is written.
+    ///
+    /// A block of any live attempt counts, of a dead one never.
     pub fn accepts(&self, worker: WorkerId, block: BlockRef) -> Verdict {
-        let _ = (worker, block);
-        Verdict::Refuse(crate::BlockRefusal::AttemptDead)
+        let refuse = Verdict::Refuse;
+        let Some(attempt) = self.live(block.attempt) else {
+            return refuse(BlockRefusal::AttemptDead);
+        };
+        if attempt.worker != worker {
+            return refuse(BlockRefusal::NotYours);
+        }
+        if attempt.image != block.image {
+            return refuse(BlockRefusal::OtherImage);
+        }
+        if !is_block_of(attempt.rect, block.rect) {
+            return refuse(BlockRefusal::NotABlock);
+        }
+        let work = self
+            .jobs
+            .get(&block.image.job)
+            .and_then(|job| job.work.get(&job.place(block.image.image)?));
+        match work {
+            Some(work) if work.pixels.covers(block.rect) => Verdict::AlreadyDone,
+            Some(_) => Verdict::Accept,
+            None => refuse(BlockRefusal::AttemptDead),
+        }
     }
 
     /// A job.
     pub fn job(&self, job: JobId) -> Option<JobView<'_>> {
-        let _ = job;
-        None
+        self.jobs.get(&job).map(Job::view)
+    }
+
+    /// The job that a submission became.
+    pub fn submitted(&self, submission: SubmissionId) -> Option<JobId> {
+        self.submissions.get(&submission).copied()
     }
 
     /// All jobs that are remembered, oldest first.
     pub fn jobs(&self) -> impl Iterator<Item = JobView<'_>> {
-        core::iter::empty()
+        self.jobs.values().map(Job::view)
     }
 
     /// The images of a job, in order; none for a job that is not known.
     pub fn images(&self, job: JobId) -> impl Iterator<Item = ImageView> {
-        let _ = job;
-        core::iter::empty()
+        self.jobs
+            .get(&job)
+            .into_iter()
+            .flat_map(|job| (0..job.spec.frames.count()).map(|place| job.image_view(place)))
     }
 
     /// One image.
     pub fn image(&self, image: ImageRef) -> Option<ImageView> {
-        let _ = image;
-        None
+        let job = self.jobs.get(&image.job)?;
+        Some(job.image_view(job.place(image.image)?))
     }
 
     /// The images of a job that failed, in the order in which they did; the first
     /// [`crate::Limits::failures_kept_max`] of them.
     pub fn failures(&self, job: JobId) -> &[ImageFailure] {
-        let _ = job;
-        &[]
+        self.jobs.get(&job).map_or(&[], |job| &job.failures)
     }
 
     /// A worker.
     pub fn worker(&self, worker: WorkerId) -> Option<WorkerView> {
-        let _ = worker;
-        None
+        Some(self.workers.get(&worker)?.view(worker))
     }
 
     /// All workers that are known, by id.
     pub fn workers(&self) -> impl Iterator<Item = WorkerView> {
-        core::iter::empty()
+        self.workers.iter().map(|(&id, worker)| worker.view(id))
     }
 
     /// Whose a live attempt is, and its image and tile; `None` for one that is dead.
-    pub fn attempt(&self, attempt: AttemptId) -> Option<(WorkerId, ImageRef, model::Rect)> {
-        let _ = attempt;
-        None
+    pub fn attempt(&self, attempt: AttemptId) -> Option<(WorkerId, ImageRef, Rect)> {
+        let attempt = self.live(attempt)?;
+        Some((attempt.worker, attempt.image, attempt.rect))
+    }
+
+    /// A live attempt; one of another epoch never is.
+    pub(crate) fn live(&self, attempt: AttemptId) -> Option<&Attempt> {
+        (attempt.epoch == self.config.epoch)
+            .then(|| self.attempts.get(&attempt.number))
+            .flatten()
+    }
+
+    /// The number of a live attempt, if it is this worker's.
+    pub(crate) fn owned(&self, worker: WorkerId, attempt: AttemptId) -> Option<u64> {
+        let live = self.live(attempt)?;
+        (live.worker == worker).then_some(attempt.number)
+    }
+
+    pub(crate) fn attempt_id(&self, number: u64) -> AttemptId {
+        AttemptId {
+            epoch: self.config.epoch,
+            number,
+        }
     }
 }

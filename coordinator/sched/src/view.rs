@@ -81,6 +81,8 @@ pub struct ImageCounts {
     pub encoded: u32,
     /// Given up.
     pub failed: u32,
+    /// Not wanted any more: their job was cancelled before they were in their place.
+    pub dropped: u32,
 }
 
 /// How far an image is.
@@ -99,6 +101,8 @@ pub enum ImageState {
     },
     /// Given up; [`crate::Sched::failures`] says why.
     Failed,
+    /// Not wanted any more: its job was cancelled before it was in its place.
+    Dropped,
 }
 
 /// An image, as it stands.
@@ -138,6 +142,8 @@ pub struct WorkerView {
     pub credit: u32,
     /// How many it holds.
     pub attempts: u32,
+    /// How many of those it is known to be rendering.
+    pub running: u32,
     /// When it was last heard of.
     pub heard: Timestamp,
     /// When it joined first.

@@ -1,0 +1,126 @@
+//! One live try at one tile.
+
+use alloc::vec;
+use alloc::vec::Vec;
+
+use model::rect::GRID_SQUARE;
+use model::{ImageRef, Rect, Span, Timestamp, WorkerId};
+
+/// A live attempt; it is removed when it ends.
+#[derive(Clone, Debug)]
+pub(crate) struct Attempt {
+    pub(crate) worker: WorkerId,
+    pub(crate) image: ImageRef,
+    /// Index of the tile in its image.
+    pub(crate) tile: u32,
+    pub(crate) rect: Rect,
+    pub(crate) leased: Timestamp,
+    pub(crate) phase: Phase,
+    /// Blocks that its worker said it has rendered.
+    pub(crate) rendered: u32,
+    /// Blocks that it was leased for.
+    wanted: u32,
+    /// Blocks that arrived under it and are durable.
+    pub(crate) delivered: u32,
+    /// One bit per block of the tile, row by row: arrived under this attempt.
+    arrived: Vec<u64>,
+    /// How long it may take over one block.
+    pub(crate) limit: Span,
+    /// When it counts as stuck; set while it is [`Phase::Running`].
+    pub(crate) stuck: Option<Timestamp>,
+}
+
+/// What its worker is known to do with an attempt.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) enum Phase {
+    /// Holds it, and has not started.
+    Ahead,
+    /// Renders it; it must make progress by itself.
+    Running,
+    /// Has rendered it, and its last blocks wait their turn on the link.
+    Delivering,
+}
+
+/// What an attempt starts with.
+pub(crate) struct Start {
+    pub(crate) worker: WorkerId,
+    pub(crate) image: ImageRef,
+    pub(crate) tile: u32,
+    pub(crate) rect: Rect,
+    pub(crate) leased: Timestamp,
+    pub(crate) wanted: u32,
+    pub(crate) limit: Span,
+}
+
+impl Attempt {
+    pub(crate) fn new(start: Start) -> Self {
+        let (columns, rows) = squares(start.rect);
+        Self {
+            worker: start.worker,
+            image: start.image,
+            tile: start.tile,
+            rect: start.rect,
+            leased: start.leased,
+            phase: Phase::Ahead,
+            rendered: 0,
+            wanted: start.wanted,
+            delivered: 0,
+            arrived: vec![0; (columns * rows).div_ceil(64)],
+            limit: start.limit,
+            stuck: None,
+        }
+    }
+
+    /// Notes how many blocks its worker says to have rendered; says whether that is progress.
+    pub(crate) fn reports(&mut self, rendered: u32) -> bool {
+        let rendered = rendered.min(self.wanted);
+        let moved = self.phase == Phase::Ahead || rendered > self.rendered;
+        self.rendered = self.rendered.max(rendered);
+        moved
+    }
+
+    /// The phase that the reports so far amount to, once it is known to have started.
+    pub(crate) fn phase_now(&self) -> Phase {
+        if self.rendered >= self.wanted {
+            Phase::Delivering
+        } else {
+            Phase::Running
+        }
+    }
+
+    /// Notes that a block of the tile arrived; says whether it is the first time.
+    pub(crate) fn arrives(&mut self, block: Rect) -> bool {
+        let column = (block.x0 / GRID_SQUARE - self.rect.x0 / GRID_SQUARE) as usize;
+        let row = (block.y0 / GRID_SQUARE - self.rect.y0 / GRID_SQUARE) as usize;
+        let index = row * squares(self.rect).0 + column;
+        let bit = 1 << (index % 64);
+        let first = self.arrived[index / 64] & bit == 0;
+        self.arrived[index / 64] |= bit;
+        self.delivered += u32::from(first);
+        first
+    }
+
+    /// Whether its worker has nothing left to send.
+    pub(crate) fn is_delivered(&self) -> bool {
+        self.delivered >= self.wanted
+    }
+}
+
+/// Columns and rows of grid squares that a tile touches.
+fn squares(tile: Rect) -> (usize, usize) {
+    let columns = tile.x1.div_ceil(GRID_SQUARE) - tile.x0 / GRID_SQUARE;
+    let rows = tile.y1.div_ceil(GRID_SQUARE) - tile.y0 / GRID_SQUARE;
+    (columns as usize, rows as usize)
+}
+
+/// The block of `tile` in the grid square of `rect`, if `rect` is that block.
+pub(crate) fn is_block_of(tile: Rect, rect: Rect) -> bool {
+    let square = |from: u32| {
+        (
+            from / GRID_SQUARE * GRID_SQUARE,
+            (from / GRID_SQUARE + 1).saturating_mul(GRID_SQUARE),
+        )
+    };
+    let ((x0, x1), (y0, y1)) = (square(rect.x0), square(rect.y0));
+    !rect.is_empty() && tile.intersection(Rect { x0, y0, x1, y1 }) == Some(rect)
+}
