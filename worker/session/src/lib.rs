@@ -17,7 +17,12 @@ mod backoff;
 mod config;
 mod effect;
 mod event;
+mod held;
+mod invariants;
+mod leave;
+mod link;
 mod session;
+mod tiles;
 
 pub use backoff::Backoff;
 pub use config::Config;

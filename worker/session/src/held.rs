@@ -1,0 +1,59 @@
+//! An attempt that the worker holds, and its blocks that are not acknowledged.
+
+use alloc::collections::VecDeque;
+use alloc::string::String;
+
+use model::{Lease, Rect};
+
+#[derive(Clone, Debug)]
+pub(crate) struct Held {
+    pub(crate) lease: Lease,
+    pub(crate) phase: Phase,
+    /// Blocks rendered so far.
+    pub(crate) rendered: u32,
+    /// Blocks rendered and not acknowledged, in the order in which they were rendered.
+    pub(crate) unacked: VecDeque<Rect>,
+}
+
+/// What becomes of an attempt.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) enum Phase {
+    /// It waits for a thread.
+    Waiting,
+    /// A thread renders it.
+    Running,
+    /// All its blocks are rendered; it ends when they are acknowledged.
+    Rendered,
+    /// It cannot be rendered; said when the blocks that could be are acknowledged.
+    Failed(String),
+    /// The worker leaves; given back when the blocks that are rendered are acknowledged.
+    Stopped,
+}
+
+impl Held {
+    pub(crate) fn new(lease: Lease) -> Self {
+        Self {
+            lease,
+            phase: Phase::Waiting,
+            rendered: 0,
+            unacked: VecDeque::new(),
+        }
+    }
+
+    /// Notes a rendered block; says whether it is new and still wanted.
+    pub(crate) fn renders(&mut self, rect: Rect) -> bool {
+        let takes = matches!(self.phase, Phase::Running | Phase::Stopped);
+        let new = takes && !self.unacked.contains(&rect);
+        if new {
+            self.rendered += 1;
+            self.unacked.push_back(rect);
+        }
+        new
+    }
+
+    /// Notes that a block needs no more sending; says whether it was kept.
+    pub(crate) fn answers(&mut self, rect: Rect) -> bool {
+        let place = self.unacked.iter().position(|&kept| kept == rect);
+        place.and_then(|place| self.unacked.remove(place)).is_some()
+    }
+}
