@@ -1,0 +1,65 @@
+//! The commands: what each is called, and which file runs it.
+
+mod completions;
+mod image;
+
+use std::path::PathBuf;
+
+use clap::{CommandFactory as _, Parser, Subcommand};
+
+use crate::error::{Ending, Error};
+use crate::options::Context;
+use crate::output::Format;
+
+/// What every help page ends with.
+fn after_help() -> String {
+    format!(
+        "{}\nEvery long option of a command has two twins: `flyby render --threads 2` is also \
+         FLYBY_RENDER_THREADS=2 in the environment, and `threads = 2` under [render] in the \
+         configuration file ($FLYBY_CONFIG, else ~/.config/flyby/config.toml). Options of all \
+         commands, such as --state, are FLYBY_STATE, and `state` at the file's top. A flag \
+         counts before the environment, which counts before the file.",
+        Ending::table()
+    )
+}
+
+/// A render farm for procedural landscapes.
+#[derive(Parser, Debug)]
+#[command(name = "flyby", version, max_term_width = 100, after_long_help = after_help())]
+pub(crate) struct Cli {
+    #[command(subcommand)]
+    command: Command,
+
+    /// How results are printed on standard output.
+    #[arg(long, global = true, value_enum, default_value_t, help_heading = "Everywhere")]
+    output: Format,
+
+    /// State folder of the farm: token, address, frames of the coordinator
+    /// [default: $XDG_STATE_HOME/flyby or ~/.local/state/flyby].
+    #[arg(long, global = true, value_name = "DIR", help_heading = "Everywhere")]
+    state: Option<PathBuf>,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// What frames hold: digests, metadata, differences.
+    #[command(subcommand)]
+    Image(image::ImageCommand),
+    /// Prints a completion script for a shell.
+    Completions(completions::Completions),
+    /// Writes the manual pages.
+    Man(completions::Man),
+}
+
+/// Runs what the user asked for; `state` is the state folder where none is named.
+pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
+    let context = Context {
+        output: cli.output,
+        state: cli.state.or(state),
+    };
+    match cli.command {
+        Command::Image(command) => image::run(&context, command),
+        Command::Completions(options) => completions::completions(&options, Cli::command()),
+        Command::Man(options) => completions::man(&options, Cli::command()),
+    }
+}

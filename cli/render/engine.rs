@@ -1,0 +1,376 @@
+//! Renders images in this process, on threads of its own.
+//!
+//! Blocks go into each image's scratch file as they are done, so that an interrupted
+//! render goes on where it was; a finished image is encoded by the thread that rendered
+//! its last block, while the others render the next image.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use image::{
+    FinishedFrame, Formats, FrameMetadata, FrameRequest, Opened, Scratch, ScratchIdentity,
+    ViewTransform,
+};
+use model::{Digest, ImageNumber, Rect, Resolution};
+use render::{Assets, Counts, EvalSettings, ImageRenderer};
+use scene::Description;
+
+use super::line::{Line, Next, last};
+use crate::error::Error;
+use crate::stop::Stop;
+
+/// How often whoever watches is told about progress.
+const REPORT_INTERVAL: Duration = Duration::from_millis(100);
+
+/// What to render, and how.
+pub(crate) struct Plan<'a> {
+    /// The scene.
+    pub(crate) description: &'a Description,
+    /// Its digest.
+    pub(crate) digest: Digest,
+    /// The files that it names.
+    pub(crate) assets: &'a Assets,
+    /// Which images, in order.
+    pub(crate) images: Vec<ImageNumber>,
+    /// Where the frames go; it exists.
+    pub(crate) folder: PathBuf,
+    /// What the frames' names begin with.
+    pub(crate) stem: String,
+    /// Which files each image becomes.
+    pub(crate) formats: Formats,
+    /// The order of the work: images are cut into tiles of this size.
+    pub(crate) tile: Option<Resolution>,
+    /// Render threads, at least 1.
+    pub(crate) threads: usize,
+    /// How fields are evaluated.
+    pub(crate) settings: EvalSettings,
+    /// What frames say about themselves, but for their statistics.
+    pub(crate) metadata: FrameMetadata,
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub(crate) struct Done {
+    /// Pixels in scratch files or frames, those found there included.
+    pub(crate) pixels: u64,
+    /// Pixels that were found in scratch files.
+    pub(crate) pixels_found: u64,
+    /// Camera rays cast.
+    pub(crate) rays: u64,
+}
+
+/// What happened.
+pub(crate) enum News<'a> {
+    /// An image was begun, and its scratch file held something.
+    Found(ImageNumber, Opened),
+    /// An image is finished.
+    Frame(ImageNumber, &'a FinishedFrame),
+    /// Some blocks are done.
+    Progress,
+}
+
+/// What a render that ran to its end leaves.
+#[derive(Debug)]
+pub(crate) struct Outcome {
+    /// The frames, in the order of their images.
+    pub(crate) frames: Vec<(ImageNumber, FinishedFrame)>,
+    /// Work done in this run.
+    pub(crate) counts: Counts,
+    /// How long it took.
+    pub(crate) wall: Duration,
+}
+
+/// An image that is being rendered.
+struct Work {
+    image: ImageNumber,
+    renderer: ImageRenderer,
+    scratch: Scratch,
+    counts: Mutex<Counts>,
+}
+
+enum Event {
+    Found(ImageNumber, Opened),
+    Finished(ImageNumber, FinishedFrame, Counts),
+    Failed(Error),
+}
+
+/// What the threads share.
+struct Shared<'a> {
+    plan: &'a Plan<'a>,
+    line: Line<Work>,
+    halt: AtomicBool,
+    pixels: AtomicU64,
+    pixels_found: AtomicU64,
+    rays: AtomicU64,
+}
+
+/// Renders what the plan says; `tell` hears of it on the calling thread.
+///
+/// Fails with the first error of any thread, or as interrupted once `stop` is set;
+/// frames finished until then stay, and scratch files of the others too.
+pub(crate) fn render(
+    plan: &Plan<'_>,
+    stop: &Stop,
+    mut tell: impl FnMut(Done, News<'_>),
+) -> Result<Outcome, Error> {
+    let started = Instant::now();
+    let shared = Shared {
+        plan,
+        line: Line::new(plan.images.iter().copied(), plan.threads),
+        halt: AtomicBool::new(false),
+        pixels: AtomicU64::new(0),
+        pixels_found: AtomicU64::new(0),
+        rays: AtomicU64::new(0),
+    };
+    let mut outcome = Outcome {
+        frames: Vec::new(),
+        counts: Counts::default(),
+        wall: Duration::ZERO,
+    };
+    let mut failure = None;
+    thread::scope(|scope| {
+        let (events, heard) = mpsc::channel();
+        for number in 0..plan.threads.max(1) {
+            let (shared, events) = (&shared, events.clone());
+            let thread = thread::Builder::new().name(format!("render-{number}"));
+            let spawned = thread.spawn_scoped(scope, move || shared.work(&events));
+            if let Err(error) = spawned {
+                shared.end();
+                failure = Some(Error::failed("cannot start a render thread").because(error));
+            }
+        }
+        drop(events);
+        listen(&shared, &heard, stop, &mut outcome, &mut failure, &mut tell);
+    });
+    if let Some(error) = failure {
+        return Err(error);
+    }
+    if outcome.frames.len() < plan.images.len() {
+        return Err(Error::interrupted("interrupted before every frame was done"));
+    }
+    outcome.frames.sort_by_key(|(image, _)| *image);
+    outcome.wall = started.elapsed();
+    Ok(outcome)
+}
+
+/// Passes on what the threads say until the last one has ended.
+fn listen(
+    shared: &Shared<'_>,
+    heard: &Receiver<Event>,
+    stop: &Stop,
+    outcome: &mut Outcome,
+    failure: &mut Option<Error>,
+    tell: &mut impl FnMut(Done, News<'_>),
+) {
+    loop {
+        if stop.is_set() {
+            shared.end();
+        }
+        match heard.recv_timeout(REPORT_INTERVAL) {
+            Err(RecvTimeoutError::Timeout) => tell(shared.done(), News::Progress),
+            Err(RecvTimeoutError::Disconnected) => return,
+            Ok(Event::Found(image, opened)) => tell(shared.done(), News::Found(image, opened)),
+            Ok(Event::Finished(image, frame, counts)) => {
+                tell(shared.done(), News::Frame(image, &frame));
+                outcome.counts += counts;
+                outcome.frames.push((image, frame));
+            }
+            Ok(Event::Failed(error)) => {
+                shared.end();
+                failure.get_or_insert(error);
+            }
+        }
+    }
+}
+
+impl Shared<'_> {
+    /// Asks every thread to end.
+    fn end(&self) {
+        self.halt.store(true, Ordering::Release);
+        self.line.close();
+    }
+
+    fn done(&self) -> Done {
+        Done {
+            pixels: self.pixels.load(Ordering::Relaxed),
+            pixels_found: self.pixels_found.load(Ordering::Relaxed),
+            rays: self.rays.load(Ordering::Relaxed),
+        }
+    }
+
+    /// One thread's life.
+    fn work(&self, events: &Sender<Event>) {
+        let mut buffers = Buffers::default();
+        loop {
+            let done = match self.line.next() {
+                Next::End => return,
+                Next::Open(image) => self.open(image, events),
+                Next::Block(work, block) => self
+                    .block(&work, block, &mut buffers)
+                    .map(|()| last(work).filter(|work| work.scratch.is_complete())),
+            };
+            let told = match done.and_then(|work| work.map(|work| self.finish(work)).transpose()) {
+                Ok(None) => Ok(()),
+                Ok(Some(event)) => events.send(event),
+                Err(error) => {
+                    self.end();
+                    events.send(Event::Failed(error))
+                }
+            };
+            if told.is_err() {
+                return;
+            }
+        }
+    }
+
+    /// Compiles an image and opens its scratch file; returns it where nothing is left to render.
+    fn open(&self, image: ImageNumber, events: &Sender<Event>) -> Result<Option<Work>, Error> {
+        let plan = self.plan;
+        let renderer = ImageRenderer::new(plan.description, plan.assets, image, plan.settings)
+            .map_err(|error| Error::failed(format!("cannot render frame {image}")).because(error))?;
+        let film = &plan.description.film;
+        let identity = ScratchIdentity {
+            scene: plan.digest,
+            revision: plan.metadata.revision,
+            image,
+            resolution: film.resolution,
+        };
+        let path = plan
+            .folder
+            .join(format!(".{}_{:04}.scratch", plan.stem, image.0));
+        let (scratch, opened) = Scratch::open_or_create(path, identity, film.window)
+            .map_err(|error| Error::failed(format!("cannot begin frame {image}")).because(error))?;
+        let found = scratch.pixels_done();
+        self.pixels.fetch_add(found, Ordering::Relaxed);
+        self.pixels_found.fetch_add(found, Ordering::Relaxed);
+        if opened != Opened::New {
+            // Whoever listens ends only after this thread.
+            let _ = events.send(Event::Found(image, opened));
+        }
+        let blocks = in_tiles(scratch.remaining(), film.window, plan.tile);
+        let work = Work {
+            image,
+            renderer,
+            scratch,
+            counts: Mutex::default(),
+        };
+        Ok(self.line.opened(work, blocks))
+    }
+
+    /// Renders one block into its place; one that was cancelled leaves nothing.
+    fn block(&self, work: &Work, block: Rect, buffers: &mut Buffers) -> Result<(), Error> {
+        let Buffers { pixels, payload } = buffers;
+        let rendered = work.renderer.render_block(block, &self.halt, pixels);
+        let Ok(counts) = rendered else {
+            return Ok(());
+        };
+        payload.clear();
+        payload.extend(pixels.iter().flat_map(|value| value.to_le_bytes()));
+        work.scratch.write_block(block, payload).map_err(|error| {
+            Error::failed(format!("cannot keep a part of frame {}", work.image)).because(error)
+        })?;
+        self.pixels.fetch_add(block.area(), Ordering::Relaxed);
+        self.rays.fetch_add(counts.rays, Ordering::Relaxed);
+        *work.counts.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += counts;
+        Ok(())
+    }
+
+    /// Encodes an image whose last block is done.
+    fn finish(&self, work: Work) -> Result<Event, Error> {
+        let plan = self.plan;
+        let image = work.image;
+        let counts = work
+            .counts
+            .into_inner()
+            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let request = FrameRequest {
+            folder: plan.folder.clone(),
+            stem: plan.stem.clone(),
+            number: image,
+            formats: plan.formats,
+            metadata: FrameMetadata {
+                statistics: statistics(&counts),
+                ..plan.metadata.clone()
+            },
+            view: ViewTransform {
+                exposure_stops: plan.description.film.exposure,
+            },
+        };
+        let failed = |error| Error::failed(format!("cannot write frame {image}")).because(error);
+        let frame = image::finish(&work.scratch, &request).map_err(failed)?;
+        work.scratch.discard().map_err(failed)?;
+        Ok(Event::Finished(image, frame, counts))
+    }
+}
+
+/// A thread's memory between blocks.
+#[derive(Default)]
+struct Buffers {
+    pixels: Vec<f32>,
+    payload: Vec<u8>,
+}
+
+/// Counts as a frame's metadata holds them.
+fn statistics(counts: &Counts) -> String {
+    let named: serde_json::Map<String, serde_json::Value> = counts
+        .named()
+        .into_iter()
+        .map(|(name, count)| (name.to_owned(), count.into()))
+        .collect();
+    serde_json::Value::Object(named).to_string()
+}
+
+/// Cuts what is left of a window along tiles, and puts it into their order.
+fn in_tiles(blocks: Vec<Rect>, window: Rect, tile: Option<Resolution>) -> Vec<Rect> {
+    let Some(Resolution { width, height }) = tile else {
+        return blocks;
+    };
+    let mut pieces = Vec::new();
+    for block in blocks {
+        let columns = (block.x0 - window.x0) / width..=(block.x1 - 1 - window.x0) / width;
+        let rows = (block.y0 - window.y0) / height..=(block.y1 - 1 - window.y0) / height;
+        for (row, column) in rows.flat_map(|row| columns.clone().map(move |column| (row, column))) {
+            let (x0, y0) = (window.x0 + column * width, window.y0 + row * height);
+            let tile = Rect {
+                x0,
+                y0,
+                x1: x0.saturating_add(width),
+                y1: y0.saturating_add(height),
+            };
+            pieces.extend(block.intersection(tile).map(|piece| ((row, column), piece)));
+        }
+    }
+    // Stable: inside a tile the blocks keep their order.
+    pieces.sort_by_key(|(place, _)| *place);
+    pieces.into_iter().map(|(_, piece)| piece).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cut_what_is_left_without_loss() {
+        let window = Rect {
+            x0: 3,
+            y0: 5,
+            x1: 203,
+            y1: 155,
+        };
+        let blocks: Vec<Rect> = window.blocks().skip(3).collect();
+        for (width, height) in [(64, 64), (40, 60), (200, 25), (1000, 1)] {
+            let tile = Some(Resolution { width, height });
+            let cut = in_tiles(blocks.clone(), window, tile);
+            assert!(cut.iter().all(|block| block.is_block()));
+            assert_eq!(
+                cut.iter().map(|block| block.area()).sum::<u64>(),
+                blocks.iter().map(|block| block.area()).sum::<u64>()
+            );
+        }
+        assert_eq!(in_tiles(blocks.clone(), window, None), blocks);
+    }
+}

@@ -1,0 +1,104 @@
+//! How users write sizes, rectangles and settings on the command line.
+
+use model::rect::SIDE_MAX;
+use model::{Rect, Resolution};
+
+/// Two whole numbers from 1 to the longest side of an image, as in `400x300`.
+pub(crate) fn resolution(text: &str) -> Result<Resolution, String> {
+    let form = || format!("`{text}` is no size: write it as 400x300, width before height");
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(form)?;
+    let side = |digits: &str| -> Result<u32, String> {
+        let side: u32 = digits.trim().parse().map_err(|_| form())?;
+        if (1..=SIDE_MAX).contains(&side) {
+            Ok(side)
+        } else {
+            Err(format!("each side has 1 to {SIDE_MAX} pixels, not {side}"))
+        }
+    };
+    Ok(Resolution {
+        width: side(width)?,
+        height: side(height)?,
+    })
+}
+
+/// A part of an image: `x0,y0,x1,y1` (the last two not included) or `WxH+X+Y`.
+pub(crate) fn crop(text: &str) -> Result<Rect, String> {
+    let form = || {
+        format!(
+            "`{text}` is no part of an image: write it as x0,y0,x1,y1 (x1 and y1 are not \
+             included) or as WxH+X+Y"
+        )
+    };
+    let number = |digits: &str| digits.trim().parse::<u32>().map_err(|_| form());
+    let rect = if let Some((size, place)) = text.split_once('+') {
+        let (x, y) = place.split_once('+').ok_or_else(form)?;
+        let (x0, y0) = (number(x)?, number(y)?);
+        let size = resolution(size)?;
+        Rect {
+            x0,
+            y0,
+            x1: x0.saturating_add(size.width),
+            y1: y0.saturating_add(size.height),
+        }
+    } else {
+        let numbers = text
+            .split(',')
+            .map(number)
+            .collect::<Result<Vec<_>, _>>()?;
+        let [x0, y0, x1, y1] = numbers[..] else {
+            return Err(form());
+        };
+        Rect { x0, y0, x1, y1 }
+    };
+    if rect.is_empty() || rect.x1 > SIDE_MAX || rect.y1 > SIDE_MAX {
+        Err(format!("`{text}` holds no pixel of an image: {}", form()))
+    } else {
+        Ok(rect)
+    }
+}
+
+/// A setting of a scene, `key=value`; the key is a path such as `camera.path.altitude`.
+pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => {
+            Ok((key.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err(format!("`{text}` is no setting: write it as key=value")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rect(x0: u32, y0: u32, x1: u32, y1: u32) -> Rect {
+        Rect { x0, y0, x1, y1 }
+    }
+
+    #[test]
+    fn sizes() {
+        let size = |width, height| Ok(Resolution { width, height });
+        assert_eq!(resolution("400x300"), size(400, 300));
+        assert_eq!(resolution("1X65536"), size(1, 65_536));
+        for wrong in ["400", "0x3", "3x0", "65537x1", "-1x3", "ax3", "1x2x3", ""] {
+            assert!(resolution(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn parts_of_an_image() {
+        assert_eq!(crop("10,20,40,60"), Ok(rect(10, 20, 40, 60)));
+        assert_eq!(crop("30x40+10+20"), Ok(rect(10, 20, 40, 60)));
+        for wrong in ["10,20,10,60", "1,2,3", "30x40", "30x40+1", "9,9,1,1", "1x1+65536+0", ""] {
+            assert!(crop(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn settings() {
+        let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
+        assert_eq!(setting("a.b=3 m"), pair("a.b", "3 m"));
+        assert_eq!(setting("f=x == 1"), pair("f", "x == 1"));
+        assert!(setting("a").is_err() && setting("=3").is_err());
+    }
+}
