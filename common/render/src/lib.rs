@@ -1,1 +1,36 @@
-//! (empty)
+//! Images from fields: rays, their first roots, anti-aliasing, shading, sky.
+//!
+//! A pixel depends on the scene, the image number and its own place, and on
+//! nothing else: not on blocks, batches, threads or SIMD levels. This crate opens no file, reads no clock
+//! and starts no thread; [`ImageRenderer`] is the way in.
+//!
+//! - [`sample`]: where and when the image is sampled (thesis §6.2, §6.3).
+//! - [`view`]: how a sample becomes a ray.
+//! - [`trace`]: where the ray meets the surface, guaranteed (thesis §5.2).
+//! - [`shade`], [`sky`]: what light leaves there and arrives here.
+//! - [`film`]: samples become pixels.
+
+mod assets;
+mod counts;
+mod error;
+mod film;
+mod renderer;
+mod sample;
+mod shade;
+mod sky;
+mod trace;
+mod view;
+
+pub use assets::Assets;
+pub use counts::Counts;
+pub use error::{Cancelled, RenderError};
+pub use field::SimdLevel;
+pub use renderer::{EvalSettings, ImageRenderer};
+pub use sample::spline::FILTER_ORDER_MAX;
+pub use sample::strata::RAYS_MAX;
+
+/// The renderer's revision: raised whenever a pixel of any scene changes.
+///
+/// The test `pixels_change_only_with_the_revision` holds digests of small images
+/// beside it. Jobs are pinned to one revision, and only workers of it get their tiles.
+pub const REVISION: u32 = 1;

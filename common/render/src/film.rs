@@ -1,0 +1,133 @@
+//! Samples become pixels.
+
+use glam::DVec3;
+use model::Rect;
+use model::film::CHANNEL_COUNT;
+
+use crate::counts::Counts;
+use crate::sky::Colour;
+
+/// What a sample saw.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Seen {
+    /// Light that reached the eye.
+    pub(crate) radiance: Colour,
+    /// Distance and unit normal of the surface, if there was any.
+    pub(crate) surface: Option<(f64, DVec3)>,
+}
+
+/// The pixels of a block, filled one after another.
+pub(crate) struct Film<'a> {
+    pixels: &'a mut Vec<f32>,
+    area: usize,
+    next: usize,
+}
+
+impl<'a> Film<'a> {
+    /// An empty film in `pixels`, plane by plane.
+    pub(crate) fn new(block: Rect, pixels: &'a mut Vec<f32>) -> Self {
+        let area = block.width() as usize * block.height() as usize;
+        pixels.clear();
+        pixels.resize(area * CHANNEL_COUNT, 0.0);
+        Self {
+            pixels,
+            area,
+            next: 0,
+        }
+    }
+
+    /// Adds the next pixel, the mean of its samples: summed in their order, each of the same weight.
+    ///
+    /// A sample that is not finite counts as black, and is counted.
+    pub(crate) fn push(&mut self, samples: &[Seen], counts: &mut Counts) {
+        let mut light = [0.0; 3];
+        let mut normal = DVec3::ZERO;
+        let (mut met, mut way) = (0.0, 0.0);
+        for seen in samples {
+            if seen.radiance.iter().all(|c| c.is_finite()) {
+                for (sum, radiance) in light.iter_mut().zip(seen.radiance) {
+                    *sum += radiance;
+                }
+            } else {
+                counts.not_finite += 1;
+            }
+            if let Some((distance, towards)) = seen.surface {
+                met += 1.0;
+                way += distance;
+                normal += towards;
+            }
+        }
+        let weight = 1.0 / samples.len() as f64;
+        let values = [
+            light[0] * weight,
+            light[1] * weight,
+            light[2] * weight,
+            met * weight,
+            if met > 0.0 { way / met } else { 0.0 },
+            normal.x * weight,
+            normal.y * weight,
+            normal.z * weight,
+        ];
+        for (plane, value) in values.into_iter().enumerate() {
+            self.pixels[plane * self.area + self.next] = single(value);
+        }
+        self.next += 1;
+        counts.pixels += 1;
+    }
+}
+
+/// The nearest `f32`, never infinite.
+fn single(value: f64) -> f32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "rounding to the film's precision is meant"
+    )]
+    let single = value as f32;
+    single.clamp(f32::MIN, f32::MAX)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PIXEL: Rect = Rect {
+        x0: 3,
+        y0: 4,
+        x1: 4,
+        y1: 5,
+    };
+
+    #[test]
+    fn a_pixel_is_the_mean_of_its_samples() {
+        let seen = |red: f64, surface| Seen {
+            radiance: [red, 0.0, 1.0],
+            surface,
+        };
+        let mut pixels = Vec::new();
+        let mut counts = Counts::default();
+        Film::new(PIXEL, &mut pixels).push(
+            &[
+                seen(1.0, Some((10.0, DVec3::Z))),
+                seen(0.0, None),
+                seen(3.0, Some((30.0, DVec3::X))),
+                seen(0.0, None),
+            ],
+            &mut counts,
+        );
+        assert_eq!(pixels, [1.0, 0.0, 1.0, 0.5, 20.0, 0.25, 0.0, 0.25]);
+        assert_eq!((counts.pixels, counts.not_finite), (1, 0));
+    }
+
+    #[test]
+    fn nothing_that_is_not_finite_leaves() {
+        let mut pixels = Vec::new();
+        let mut counts = Counts::default();
+        let seen = [f64::NAN, f64::INFINITY, 1e300, 2.0].map(|red| Seen {
+            radiance: [red, 1.0, 1.0],
+            surface: None,
+        });
+        Film::new(PIXEL, &mut pixels).push(&seen, &mut counts);
+        assert!(pixels.iter().all(|value| value.is_finite()));
+        assert_eq!(counts.not_finite, 2);
+    }
+}

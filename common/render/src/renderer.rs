@@ -1,0 +1,425 @@
+//! Renders blocks of one image.
+
+use core::sync::atomic::AtomicBool;
+
+use field::{BATCH, Interval, Points, Scratch, SimdLevel};
+use glam::DVec3;
+use model::film::CHANNEL_COUNT;
+use model::{ImageNumber, Rect};
+use scene::Description;
+
+use crate::assets::Assets;
+use crate::counts::Counts;
+use crate::error::{Cancelled, RenderError};
+use crate::film::{Film, Seen};
+use crate::sample::spline::FILTER_ORDER_MAX;
+use crate::sample::strata::RAYS_MAX;
+use crate::sample::{Sample, Strata};
+use crate::shade::light::Lit;
+use crate::shade::{Fields, Palette, mean_albedo};
+use crate::sky::Sky;
+use crate::trace::{Goal, Hit, Ray, Surface, Tracer};
+use crate::view::{Sight, View};
+
+/// Samples that are worked on together, about: enough to fill batches, few enough for the cache.
+const TOGETHER: usize = 4096;
+
+/// Rays towards the sun start this share of a footprint above the surface.
+const LIFT: f64 = 0.5;
+
+/// How an image is computed; nothing here changes a pixel.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct EvalSettings {
+    /// The instruction set of the evaluation; every one gives the same bits.
+    pub level: SimdLevel,
+}
+
+impl Default for EvalSettings {
+    /// The fastest level of this machine.
+    fn default() -> Self {
+        Self {
+            level: SimdLevel::best(),
+        }
+    }
+}
+
+/// One image, compiled: shared by any number of threads.
+pub struct ImageRenderer {
+    view: View,
+    strata: Strata,
+    surface: Surface,
+    palette: Palette,
+    sky: Sky,
+    shadows: bool,
+}
+
+impl ImageRenderer {
+    /// Compiles image `image` of a scene: programs, bounds, tables of the sky. Takes milliseconds.
+    pub fn new(
+        description: &Description,
+        assets: &Assets,
+        image: ImageNumber,
+        settings: EvalSettings,
+    ) -> Result<Self, RenderError> {
+        let film = &description.film;
+        let sampling = &description.sampling;
+        if image.0 >= film.images {
+            return Err(RenderError::NoSuchImage {
+                image,
+                images: film.images,
+            });
+        }
+        let (rays, order) = (sampling.rays, sampling.filter_order);
+        if rays == 0 || rays > RAYS_MAX {
+            return Err(RenderError::Rays { rays });
+        }
+        if order > FILTER_ORDER_MAX {
+            return Err(RenderError::FilterOrder { order });
+        }
+        if order == 0 && rays != 1 {
+            return Err(RenderError::CentreAlone { rays });
+        }
+        let start = f64::from(image.0) / film.fps;
+        let view = View::new(&description.camera, film, start);
+        let (start, end) = view.instants();
+        let surface = Surface::new(description, &view, settings.level)?;
+        let palette = Palette::new(description, assets, Interval::new(start, end))?;
+        let up = surface.vertical(view.eye());
+        let ground = mean_albedo(&description.surface.material);
+        Ok(Self {
+            strata: Strata::new(rays, order, description.key, image.0),
+            sky: Sky::new(description, start, up, ground),
+            view,
+            surface,
+            palette,
+            shadows: description.sun.shadows,
+        })
+    }
+
+    /// Renders the pixels of `block`, any rectangle of the image.
+    ///
+    /// `pixels` is cleared and filled plane by plane in the order of
+    /// [`model::film::CHANNELS`], rows from the top, columns from the left. The values depend on scene, image
+    /// and place alone, and all of them are finite. `cancel` is looked at every
+    /// few thousand evaluations.
+    pub fn render_block(
+        &self,
+        block: Rect,
+        cancel: &AtomicBool,
+        pixels: &mut Vec<f32>,
+    ) -> Result<Counts, Cancelled> {
+        let mut work = Work::default();
+        let mut counts = Counts::default();
+        let mut film = Film::new(block, pixels);
+        let per_pixel = self.strata.per_pixel();
+        let places: Vec<(u32, u32)> = (block.y0..block.y1)
+            .flat_map(|y| (block.x0..block.x1).map(move |x| (x, y)))
+            .collect();
+        for places in places.chunks((TOGETHER / per_pixel).max(1)) {
+            work.clear();
+            for &(x, y) in places {
+                self.strata.of_pixel(x, y, &mut work.samples);
+            }
+            self.see(&mut work, cancel, &mut counts)?;
+            for seen in work.seen.chunks_exact(per_pixel) {
+                film.push(seen, &mut counts);
+            }
+        }
+        counts.noise_evaluations += work.scratch.noise_evaluations;
+        debug_assert_eq!(pixels.len(), block.area() as usize * CHANNEL_COUNT);
+        Ok(counts)
+    }
+
+    /// Follows all samples of `work` into the scene.
+    fn see(
+        &self,
+        work: &mut Work,
+        cancel: &AtomicBool,
+        counts: &mut Counts,
+    ) -> Result<(), Cancelled> {
+        counts.samples += work.samples.len() as u64;
+        counts.rays += work.samples.len() as u64;
+        for sample in &work.samples {
+            let sight = self.view.sight(sample);
+            work.sights.push(sight);
+            work.rays.push(Ray {
+                origin: sight.origin,
+                direction: sight.direction,
+                from_eye: DVec3::ZERO,
+                time: sight.time,
+                grid: self.surface.sight,
+                clear: 0.0,
+            });
+        }
+        work.tracer.trace(
+            &self.surface,
+            Goal::Distance,
+            &work.rays,
+            &mut work.scratch,
+            cancel,
+            counts,
+            &mut work.hits,
+        )?;
+        self.touch(work, counts);
+        self.cast_shadows(work, cancel, counts)?;
+        self.shade(work);
+        Ok(())
+    }
+
+    /// Gathers the places where rays met the surface, with their normals.
+    fn touch(&self, work: &mut Work, counts: &mut Counts) {
+        let Work {
+            hits,
+            sights,
+            touched,
+            places,
+            scratch,
+            ..
+        } = work;
+        for (index, (hit, sight)) in hits.iter().zip(sights.iter()).enumerate() {
+            let Some(distance) = hit.distance() else {
+                continue;
+            };
+            let place = sight.origin + sight.direction * distance;
+            places.push(place, self.surface.footprint.at(distance), sight.time);
+            touched.push(Touched {
+                sample: index,
+                distance,
+                place,
+                normal: DVec3::ZERO,
+                sun: 0.0,
+            });
+        }
+        counts.hits += touched.len() as u64;
+        counts.evaluations += touched.len() as u64;
+        let mut value = [0.0; BATCH];
+        let mut gradient = [[0.0; BATCH]; 3];
+        for first in (0..touched.len()).step_by(BATCH) {
+            let n = BATCH.min(touched.len() - first);
+            let [gx, gy, gz] = &mut gradient;
+            self.surface.program.evaluate_gradient(
+                self.surface.level,
+                &places.batch(first, n),
+                scratch,
+                &mut value[..n],
+                [&mut gx[..n], &mut gy[..n], &mut gz[..n]],
+            );
+            for i in 0..n {
+                let touched = &mut touched[first + i];
+                let slope = DVec3::new(gradient[0][i], gradient[1][i], gradient[2][i]);
+                touched.normal = match hits[touched.sample] {
+                    Hit::Face(_) => self.face(touched.place),
+                    _ => self.normal(touched.place, slope),
+                };
+            }
+        }
+    }
+
+    /// The gradient as a unit vector, or the vertical where it has no direction.
+    fn normal(&self, place: DVec3, slope: DVec3) -> DVec3 {
+        let largest = slope.abs().max_element();
+        if !(largest > 0.0 && largest.is_finite()) {
+            return self.surface.vertical(place);
+        }
+        let slope = slope * (1.0 / largest);
+        slope * (1.0 / slope.dot(slope).sqrt())
+    }
+
+    /// The normal of the box's face that a place is on.
+    fn face(&self, place: DVec3) -> DVec3 {
+        let scene::description::Bound::Box { min, max } = self.surface.bound else {
+            return self.surface.vertical(place);
+        };
+        let mut nearest = (f64::INFINITY, DVec3::Z);
+        for axis in 0..3 {
+            for (face, sign) in [(min[axis], -1.0), (max[axis], 1.0)] {
+                let distance = (place[axis] - face).abs();
+                if distance < nearest.0 {
+                    nearest = (distance, DVec3::AXES[axis] * sign);
+                }
+            }
+        }
+        nearest.1
+    }
+
+    /// Finds out which places the sun reaches.
+    fn cast_shadows(
+        &self,
+        work: &mut Work,
+        cancel: &AtomicBool,
+        counts: &mut Counts,
+    ) -> Result<(), Cancelled> {
+        work.rays.clear();
+        work.hits.clear();
+        work.asking.clear();
+        for (index, touched) in work.touched.iter_mut().enumerate() {
+            if touched.normal.dot(self.sky.sun) <= 0.0 {
+                continue;
+            }
+            touched.sun = 1.0;
+            if !self.shadows {
+                continue;
+            }
+            let sight = &work.sights[touched.sample];
+            let footprint = self.surface.footprint.at(touched.distance);
+            let origin = touched.place + touched.normal * (LIFT * footprint);
+            work.asking.push(index);
+            work.rays.push(Ray {
+                origin,
+                direction: self.sky.sun,
+                from_eye: origin - sight.origin,
+                time: sight.time,
+                grid: self.surface.shadow_grid(touched.distance),
+                clear: 0.0,
+            });
+        }
+        counts.shadow_rays += work.rays.len() as u64;
+        work.tracer.trace(
+            &self.surface,
+            Goal::Occlusion,
+            &work.rays,
+            &mut work.scratch,
+            cancel,
+            counts,
+            &mut work.hits,
+        )?;
+        for (&index, hit) in work.asking.iter().zip(&work.hits) {
+            if *hit != Hit::None {
+                work.touched[index].sun = 0.0;
+                counts.shadows += 1;
+            }
+        }
+        Ok(())
+    }
+
+    /// Gives every sample its colour.
+    fn shade(&self, work: &mut Work) {
+        let Work {
+            sights,
+            touched,
+            places,
+            fields,
+            scratch,
+            seen,
+            ..
+        } = work;
+        seen.extend(sights.iter().map(|sight| Seen {
+            radiance: self.sky.background(sight.direction),
+            surface: None,
+        }));
+        for first in (0..touched.len()).step_by(BATCH) {
+            let n = BATCH.min(touched.len() - first);
+            self.palette.evaluate(
+                self.surface.level,
+                &places.batch(first, n),
+                scratch,
+                fields,
+            );
+            for i in 0..n {
+                let touched = &touched[first + i];
+                let direction = sights[touched.sample].direction;
+                let slope = if self.palette.is_by_slope() {
+                    let vertical = self.surface.vertical(touched.place);
+                    libm::acos(touched.normal.dot(vertical).clamp(-1.0, 1.0))
+                } else {
+                    0.0
+                };
+                let height = self.surface.height(touched.place);
+                let lit = Lit {
+                    normal: touched.normal,
+                    direction,
+                    albedo: self.palette.albedo(fields, i, height, slope),
+                    sun: touched.sun,
+                };
+                let radiance = lit.radiance(&self.sky);
+                seen[touched.sample] = Seen {
+                    radiance: self.sky.through_air(radiance, direction, touched.distance),
+                    surface: Some((touched.distance, touched.normal)),
+                };
+            }
+        }
+    }
+}
+
+/// A place where a ray met the surface.
+struct Touched {
+    /// Which sample of the chunk.
+    sample: usize,
+    distance: f64,
+    place: DVec3,
+    normal: DVec3,
+    /// The share of the sun that it sees.
+    sun: f64,
+}
+
+/// Places in the form that fields are evaluated over.
+#[derive(Default)]
+struct Places {
+    x: Vec<f64>,
+    y: Vec<f64>,
+    z: Vec<f64>,
+    footprint: Vec<f64>,
+    time: Vec<f64>,
+}
+
+impl Places {
+    fn push(&mut self, place: DVec3, footprint: f64, time: f64) {
+        self.x.push(place.x);
+        self.y.push(place.y);
+        self.z.push(place.z);
+        self.footprint.push(footprint);
+        self.time.push(time);
+    }
+
+    fn batch(&self, first: usize, count: usize) -> Points<'_> {
+        let range = first..first + count;
+        Points {
+            x: &self.x[range.clone()],
+            y: &self.y[range.clone()],
+            z: &self.z[range.clone()],
+            footprint: &self.footprint[range.clone()],
+            time: &self.time[range],
+        }
+    }
+
+    fn clear(&mut self) {
+        for column in [
+            &mut self.x,
+            &mut self.y,
+            &mut self.z,
+            &mut self.footprint,
+            &mut self.time,
+        ] {
+            column.clear();
+        }
+    }
+}
+
+/// Memory of one block's rendering, reused from chunk to chunk.
+#[derive(Default)]
+struct Work {
+    samples: Vec<Sample>,
+    sights: Vec<Sight>,
+    rays: Vec<Ray>,
+    hits: Vec<Hit>,
+    touched: Vec<Touched>,
+    places: Places,
+    /// Which of `touched` each shadow ray belongs to.
+    asking: Vec<usize>,
+    seen: Vec<Seen>,
+    fields: Fields,
+    tracer: Tracer,
+    scratch: Scratch,
+}
+
+impl Work {
+    fn clear(&mut self) {
+        self.samples.clear();
+        self.sights.clear();
+        self.rays.clear();
+        self.hits.clear();
+        self.touched.clear();
+        self.places.clear();
+        self.seen.clear();
+    }
+}

@@ -1,0 +1,216 @@
+//! B-splines as densities: their distribution function and its inverse, for any order.
+//!
+//! Order m is degree m − 1 (ERRATA row 2117): 1 is the box, 2 the tent, 4 the cubic.
+
+/// Highest order of a filter; it is then 64 pixels wide.
+pub const FILTER_ORDER_MAX: u32 = 64;
+
+/// Half the number of spans of the table from which Newton's method starts.
+const SPANS: usize = 256;
+
+/// Newton's method ends when a step is shorter than this, in pixels.
+const STEP_MIN: f64 = 1e-13;
+
+/// Most Newton steps: far tails of high orders gain only a factor of (m − 1)/m with each.
+const STEPS_MAX: usize = 4096;
+
+/// The uniform B-spline n_m, thesis eq. (6.9)–(6.11), as the density of a pixel's samples.
+#[derive(Clone, Debug)]
+pub(crate) struct BSpline {
+    order: usize,
+    /// The inverse at y = i / (2 · `SPANS`), from 0 to the middle.
+    starts: Vec<f64>,
+}
+
+impl BSpline {
+    /// The B-spline of an order from 1 to [`FILTER_ORDER_MAX`].
+    pub(crate) fn new(order: u32) -> Self {
+        let order = order.clamp(1, FILTER_ORDER_MAX) as usize;
+        let mut spline = Self {
+            order,
+            starts: Vec::new(),
+        };
+        let middle = spline.width() / 2.0;
+        // From the middle downwards: each knot starts from the one above it.
+        let mut starts = vec![middle; SPANS + 1];
+        for i in (0..SPANS).rev() {
+            let y = i as f64 / (2 * SPANS) as f64;
+            starts[i] = spline.solve(y, starts[i + 1]);
+        }
+        spline.starts = starts;
+        spline
+    }
+
+    /// The width of its support in pixels, which is its order.
+    fn width(&self) -> f64 {
+        self.order as f64
+    }
+
+    /// How far its support reaches from its centre, in pixels.
+    pub(crate) fn reach(&self) -> f64 {
+        self.width() / 2.0
+    }
+
+    /// N_m(x) and n_m(x), thesis eqs. (6.15c), (6.15d) and (6.16), by a triangle of differences.
+    ///
+    /// `x` lies in 0 … m.
+    fn distribution(&self, x: f64) -> (f64, f64) {
+        let m = self.order;
+        // row[k] is N_q(x − k), for growing q.
+        let mut row = [0.0; FILTER_ORDER_MAX as usize + 1];
+        for (k, value) in row.iter_mut().enumerate().take(m) {
+            let x = x - k as f64;
+            *value = if x < 0.0 {
+                0.0
+            } else if x < 1.0 {
+                x
+            } else {
+                1.0
+            };
+        }
+        if m == 1 {
+            return (row[0], if x < 1.0 { 1.0 } else { 0.0 });
+        }
+        for q in 2..m {
+            for k in 0..=m - q {
+                let share = (x - k as f64) / q as f64;
+                row[k] = share * row[k] + (1.0 - share) * row[k + 1];
+            }
+        }
+        let share = x / self.width();
+        (
+            share * row[0] + (1.0 - share) * row[1],
+            row[0] - row[1],
+        )
+    }
+
+    /// The x with N_m(x) = y, y in 0 … ½, by Newton's method, thesis eq. (6.19) mended.
+    ///
+    /// `start` is no less than the root and no more than m/2: there N_m is
+    /// convex, so that every step falls short of the root and none passes it.
+    fn solve(&self, y: f64, start: f64) -> f64 {
+        if y <= 0.0 {
+            return 0.0;
+        }
+        let mut x = start;
+        for _ in 0..STEPS_MAX {
+            let (value, slope) = self.distribution(x);
+            if slope <= 0.0 {
+                break;
+            }
+            let step = (value - y) / slope;
+            x -= step;
+            if step < STEP_MIN {
+                break;
+            }
+        }
+        if x < 0.0 { 0.0 } else { x }
+    }
+
+    /// Where a sample lies, in pixels from the filter's centre, for a uniform `y` in [0, 1).
+    pub(crate) fn inverse(&self, y: f64) -> f64 {
+        let half = self.width() / 2.0;
+        // The tails are solved on the left alone, where y keeps its precision.
+        let (tail, sign) = if y <= 0.5 { (y, 1.0) } else { (1.0 - y, -1.0) };
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "between 0 and SPANS, from a tail between 0 and 1/2"
+        )]
+        let span = (tail * (2 * SPANS) as f64) as usize;
+        let start = self.starts[(span + 1).min(SPANS)];
+        (self.solve(tail, start) - half) * sign
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Evenly spread numbers in [0, 1), tails included.
+    fn shares() -> impl Iterator<Item = f64> {
+        let tails = [1e-12, 1e-8, 1e-6, 1e-4, 1.0 - 1e-9];
+        (0..1000).map(|i| f64::from(i) / 1000.0).chain(tails)
+    }
+
+    #[test]
+    fn the_inverse_inverts_at_every_order() {
+        for order in [1, 2, 3, 4, 5, 8, 15, 20, 64] {
+            let spline = BSpline::new(order);
+            for y in shares() {
+                let x = spline.inverse(y) + f64::from(order) / 2.0;
+                let (back, _) = spline.distribution(x);
+                assert!((back - y).abs() < 1e-12, "order {order}: {y} gave {back}");
+            }
+        }
+    }
+
+    #[test]
+    fn box_and_tent_have_their_closed_forms() {
+        let (square, tent) = (BSpline::new(1), BSpline::new(2));
+        for y in shares() {
+            assert!((square.inverse(y) - (y - 0.5)).abs() < 1e-12);
+            let closed = if y < 0.5 {
+                (2.0 * y).sqrt() - 1.0
+            } else {
+                1.0 - (2.0 * (1.0 - y)).sqrt()
+            };
+            assert!((tent.inverse(y) - closed).abs() < 1e-7, "{y}");
+        }
+    }
+
+    #[test]
+    fn the_cubic_is_the_known_polynomial() {
+        let cubic = BSpline::new(4);
+        for i in 0..=400 {
+            let x = f64::from(i) / 100.0;
+            let s = (x - 2.0).abs();
+            let density = if s < 1.0 {
+                2.0 / 3.0 - s * s + s * s * s / 2.0
+            } else {
+                let t = 2.0 - s;
+                t * t * t / 6.0
+            };
+            assert!((cubic.distribution(x).1 - density).abs() < 1e-14);
+        }
+        // The first piece of its distribution is x⁴/24.
+        let y = 1e-3;
+        let x = (24.0 * y).sqrt().sqrt() - 2.0;
+        assert!((cubic.inverse(y) - x).abs() < 1e-12);
+    }
+
+    #[test]
+    fn moments_are_those_of_a_sum_of_uniform_numbers() {
+        // n_m is the density of the sum of m uniform numbers: mean 0 (centred), variance m/12,
+        // fourth moment m/80 + m(m − 1)/48.
+        const COUNT: u32 = 20_000;
+        for order in [1, 2, 3, 4, 7] {
+            let spline = BSpline::new(order);
+            let m = f64::from(order);
+            let mut moments = [0.0; 3];
+            for i in 0..COUNT {
+                let x = spline.inverse((f64::from(i) + 0.5) / f64::from(COUNT));
+                assert!(x.abs() <= m / 2.0);
+                moments[0] += x / f64::from(COUNT);
+                moments[1] += x * x / f64::from(COUNT);
+                moments[2] += x * x * x * x / f64::from(COUNT);
+            }
+            assert!(moments[0].abs() < 1e-9);
+            assert!((moments[1] - m / 12.0).abs() < 1e-4);
+            assert!((moments[2] - (m / 80.0 + m * (m - 1.0) / 48.0)).abs() < 1e-3);
+        }
+    }
+
+    #[test]
+    fn samples_are_symmetric_and_rise() {
+        let spline = BSpline::new(4);
+        let mut last = f64::NEG_INFINITY;
+        for i in 1..4096 {
+            let y = f64::from(i) / 4096.0;
+            let x = spline.inverse(y);
+            assert!(x > last);
+            assert_eq!(x, -spline.inverse(1.0 - y));
+            last = x;
+        }
+    }
+}

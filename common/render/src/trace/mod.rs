@@ -1,0 +1,15 @@
+//! Where rays meet the surface: guaranteed, and a function of ray and field alone.
+//!
+//! The hit is *defined* as the first point of the ray's [`grid`] with f ≤ 0; the
+//! distance is then polished between that point and the one before. How the search
+//! gets there ([`tracer`]) decides only what need not be looked at.
+
+pub(crate) mod bound;
+pub(crate) mod clearance;
+pub(crate) mod grid;
+pub(crate) mod split;
+pub(crate) mod surface;
+pub(crate) mod tracer;
+
+pub(crate) use surface::Surface;
+pub(crate) use tracer::{Goal, Hit, Ray, Tracer};

@@ -1,0 +1,151 @@
+//! The surface of one image, ready to be traced.
+
+use field::{Interval, Points, Program, Scratch, SimdLevel};
+use glam::DVec3;
+use scene::Description;
+use scene::description::{Bound, Seed};
+
+use super::clearance::{Around, Clearances};
+use super::grid::Grid;
+use super::split::split;
+use crate::error::RenderError;
+use crate::view::{Footprint, View};
+
+/// Neighbouring points of a camera ray's grid are this share of a footprint apart, or up to half of it.
+const SHARE: f64 = 1.0 / 32.0;
+
+/// The same for rays towards the sun.
+const SHADOW_SHARE: f64 = 1.0 / 8.0;
+
+/// Where parallel rays stop having points at even distances, in points: 2⁴⁰.
+const EVEN_POINTS: f64 = 1_099_511_627_776.0;
+
+/// A compiled surface, its bounds and its grids.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// f.
+    pub(crate) program: Program,
+    /// How it is evaluated.
+    pub(crate) level: SimdLevel,
+    /// How far rays may step.
+    pub(crate) clearances: Clearances,
+    /// Where it can be.
+    pub(crate) bound: Bound,
+    /// What heights are measured from.
+    pub(crate) seed: Seed,
+    /// How wide pixels are.
+    pub(crate) footprint: Footprint,
+    /// The grid of every camera ray.
+    pub(crate) sight: Grid,
+}
+
+impl Surface {
+    /// Compiles the surface for the instants, distances and footprints of one view.
+    pub(crate) fn new(
+        description: &Description,
+        view: &View,
+        level: SimdLevel,
+    ) -> Result<Self, RenderError> {
+        let surface = &description.surface;
+        let (start, end) = view.instants();
+        let time = Interval::new(start, end);
+        let compile = |graph, root| {
+            Program::compile(graph, &[root], time).map_err(|source| RenderError::Field {
+                what: "surface's field",
+                source,
+            })
+        };
+        let program = compile(&surface.graph, surface.field)?;
+        let rest = match split(&surface.graph, surface.field, &surface.seed) {
+            Some(split) => Some(compile(&split.graph, split.rest)?),
+            None => None,
+        };
+        let footprint = view.footprint();
+        let around = Around {
+            field: &program,
+            rest: rest.as_ref(),
+            bound: &surface.bound,
+            seed: &surface.seed,
+            footprint,
+            time,
+            eye: view.eye(),
+            travel: view.travel(),
+        };
+        let clearances = Clearances::new(&around, nearest(&program, level, view));
+        let sight = if footprint.angle > 0.0 {
+            Grid::from_eye(footprint.angle * SHARE)
+        } else {
+            let spacing = footprint.base * SHARE;
+            Grid::even(spacing, spacing * EVEN_POINTS)
+        };
+        Ok(Self {
+            program,
+            level,
+            clearances,
+            bound: surface.bound,
+            seed: surface.seed,
+            footprint,
+            sight,
+        })
+    }
+
+    /// The grid of a ray that starts at the surface, at a distance from the eye.
+    pub(crate) fn shadow_grid(&self, distance: f64) -> Grid {
+        let spacing = self.footprint.at(distance) * SHADOW_SHARE;
+        if self.footprint.angle > 0.0 {
+            Grid::even(spacing, distance)
+        } else {
+            Grid::even(spacing, spacing * EVEN_POINTS)
+        }
+    }
+
+    /// What heights are measured along, at a place; a unit vector.
+    pub(crate) fn vertical(&self, place: DVec3) -> DVec3 {
+        match self.seed {
+            Seed::Plane => DVec3::Z,
+            Seed::Sphere { .. } => {
+                let square = place.dot(place);
+                if square > 0.0 {
+                    place * (1.0 / square.sqrt())
+                } else {
+                    DVec3::Z
+                }
+            }
+        }
+    }
+
+    /// The height of a place over the seed, metres.
+    pub(crate) fn height(&self, place: DVec3) -> f64 {
+        match self.seed {
+            Seed::Plane => place.z,
+            Seed::Sphere { radius } => place.dot(place).sqrt() - radius,
+        }
+    }
+}
+
+/// About how far the surface is from the eye: where tables of bounds begin to be of use.
+///
+/// It decides how fast rays are traced and nothing else.
+fn nearest(program: &Program, level: SimdLevel, view: &View) -> f64 {
+    const LEAST: f64 = 1.0 / 1024.0;
+    let eye = view.eye();
+    let mut value = [0.0];
+    program.evaluate(
+        level,
+        &Points {
+            x: &[eye.x],
+            y: &[eye.y],
+            z: &[eye.z],
+            footprint: &[view.footprint().at(0.0)],
+            time: &[view.instants().0],
+        },
+        &mut Scratch::new(),
+        &mut [&mut value],
+    );
+    let near = value[0].abs() / 8.0;
+    if near > LEAST && near < super::grid::FAR {
+        near
+    } else {
+        LEAST
+    }
+}
