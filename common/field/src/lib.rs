@@ -4,9 +4,14 @@
 //! behind the graph: points, gradients, ranges, moduli of continuity.
 //! This crate knows no scene, ray, image or file.
 
+mod arithmetic;
+mod cascade;
+pub mod curve;
+mod dual;
 pub mod graph;
 pub mod hash;
 pub mod interval;
+mod lanes;
 pub mod modulus;
 pub mod noise;
 pub mod op;

@@ -114,6 +114,20 @@ fn lerp(t: f32, a: f32, b: f32) -> f32 {
     a + t * (b - a)
 }
 
+/// One component of the corners' gradients, interpolated.
+#[inline(always)]
+fn mean([u, v, w]: [f32; 3], g: &[[f32; 3]; 8], i: usize) -> f32 {
+    let near = lerp(v, lerp(u, g[0][i], g[1][i]), lerp(u, g[2][i], g[3][i]));
+    let far = lerp(v, lerp(u, g[4][i], g[5][i]), lerp(u, g[6][i], g[7][i]));
+    lerp(w, near, far)
+}
+
+/// The hash of a cell's corner, good in its upper fifteen bits.
+#[inline(always)]
+fn corner(row: u32, z: u32) -> u32 {
+    hash::finish_high(hash::absorb(row, z))
+}
+
 /// The hashes of a cell's eight corners; x runs fastest.
 #[inline(always)]
 fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
@@ -126,7 +140,6 @@ fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
         hash::absorb(x0, y1),
         hash::absorb(x1, y1),
     ];
-    let corner = |row, z| hash::finish_high(hash::absorb(row, z));
     [
         corner(rows[0], z),
         corner(rows[1], z),
@@ -184,18 +197,20 @@ pub(crate) fn value_gradient(
     );
     let along_y = lerp(w, b - a, d - c);
     let along_z = f - e;
-    let g = h.map(direction);
-    let mean = |i: usize| {
-        lerp(
-            w,
-            lerp(v, lerp(u, g[0][i], g[1][i]), lerp(u, g[2][i], g[3][i])),
-            lerp(v, lerp(u, g[4][i], g[5][i]), lerp(u, g[6][i], g[7][i])),
-        )
-    };
+    let g = [
+        direction(h[0]),
+        direction(h[1]),
+        direction(h[2]),
+        direction(h[3]),
+        direction(h[4]),
+        direction(h[5]),
+        direction(h[6]),
+        direction(h[7]),
+    ];
     let gradient = [
-        mean(0) + fade_slope(x) * along_x,
-        mean(1) + fade_slope(y) * along_y,
-        mean(2) + fade_slope(z) * along_z,
+        mean([u, v, w], &g, 0) + fade_slope(x) * along_x,
+        mean([u, v, w], &g, 1) + fade_slope(y) * along_y,
+        mean([u, v, w], &g, 2) + fade_slope(z) * along_z,
     ];
     (lerp(w, e, f), gradient)
 }

@@ -1,5 +1,7 @@
 //! Where a program is evaluated, and the memory it is evaluated in.
 
+use crate::program::{Machine, Slopes};
+
 /// Points of one chunk of work: longer batches are cut into pieces of this length.
 pub const BATCH: usize = 128;
 
@@ -45,6 +47,8 @@ impl Points<'_> {
 pub struct Scratch {
     /// Noises evaluated so far, see [`crate::Program::noise_evaluations`].
     pub noise_evaluations: u64,
+    pub(crate) machine: Machine,
+    pub(crate) slopes: Slopes,
 }
 
 impl Scratch {

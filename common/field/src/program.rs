@@ -1,15 +1,33 @@
 //! Compiled fields: a graph flattened for evaluation over batches of points.
 
+mod code;
+mod fold;
+mod machine;
+mod plan;
+mod slopes;
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+use fearless_simd::dispatch;
+
 use crate::interval::Interval;
 use crate::modulus::Modulus;
 use crate::points::{Points, Scratch};
 use crate::simd::SimdLevel;
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
+use code::{Code, Operation};
+pub(crate) use machine::Machine;
+use plan::Plan;
+pub(crate) use slopes::Slopes;
 
 /// A field ready for evaluation; shared by threads.
 #[derive(Clone, Debug)]
-pub struct Program {}
+pub struct Program {
+    plan: Plan,
+    code: Code,
+}
 
 /// Why a graph could not be compiled.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -28,8 +46,9 @@ pub enum CompileError {
 impl Program {
     /// Compiles the fields `roots` of `graph` for instants in `time`: what is constant over them is computed once, here.
     pub fn compile(graph: &Graph, roots: &[NodeId], time: Interval) -> Result<Self, CompileError> {
-        let _ = (graph, roots, time);
-        Ok(Self {})
+        let plan = Plan::new(graph, roots, time)?;
+        let code = Code::new(&plan)?;
+        Ok(Self { plan, code })
     }
 
     /// Evaluates every root at every point: `out` has one slice per root, each as long as the batch.
@@ -46,7 +65,32 @@ impl Program {
         scratch: &mut Scratch,
         out: &mut [&mut [f64]],
     ) {
-        let _ = (level, points, scratch, out);
+        let n = points.len();
+        assert!(
+            out.len() == self.code.roots.len() && out.iter().all(|out| out.len() == n),
+            "there is a result slice per root, as long as the batch"
+        );
+        let Scratch {
+            noise_evaluations,
+            machine,
+            ..
+        } = scratch;
+        machine.prepare(&self.code);
+        let mut start = 0;
+        while start < n {
+            let count = dispatch!(level.token(), simd => machine.run(simd, &self.code, points, start, noise_evaluations));
+            let end = start + count.points;
+            for (out, root) in out.iter_mut().zip(&self.code.roots) {
+                for (out, value) in out[start..end].iter_mut().zip(machine.register(*root)) {
+                    *out = if value.is_nan() {
+                        f64::INFINITY
+                    } else {
+                        *value
+                    };
+                }
+            }
+            start = end;
+        }
     }
 
     /// Evaluates the first root and its gradient with respect to the place, thesis eq. (2.17).
@@ -64,7 +108,37 @@ impl Program {
         value: &mut [f64],
         gradient: [&mut [f64]; 3],
     ) {
-        let _ = (level, points, scratch, value, gradient);
+        let n = points.len();
+        assert!(
+            value.len() == n && gradient.iter().all(|part| part.len() == n),
+            "the result slices are as long as the batch"
+        );
+        let root = *self.code.roots.first().expect("there is a root");
+        let Scratch {
+            noise_evaluations,
+            slopes,
+            ..
+        } = scratch;
+        slopes.prepare(&self.code);
+        let [gx, gy, gz] = gradient;
+        let mut start = 0;
+        while start < n {
+            let count = dispatch!(level.token(), simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
+            let duals = slopes.register(root);
+            for i in 0..count.points {
+                let at = start + i;
+                let [x, y, z] = &duals.gradient;
+                value[at] = if duals.value[i].is_nan() {
+                    f64::INFINITY
+                } else {
+                    duals.value[i]
+                };
+                gx[at] = if x[i].is_nan() { 0.0 } else { x[i] };
+                gy[at] = if y[i].is_nan() { 0.0 } else { y[i] };
+                gz[at] = if z[i].is_nan() { 0.0 } else { z[i] };
+            }
+            start += count.points;
+        }
     }
 
     /// The values that each root can take, rounding included; may be infinite.
@@ -84,7 +158,14 @@ impl Program {
     /// [`Scratch::noise_evaluations`] counts them as they are evaluated; both depend on
     /// the places alone, not on batches or levels.
     pub fn noise_evaluations(&self, footprint: f64) -> u64 {
-        let _ = footprint;
-        0
+        self.code
+            .instructions
+            .iter()
+            .map(|instruction| match &instruction.act {
+                Operation::Noise(_) => 1,
+                Operation::Cascade(cascade) => cascade.count(footprint),
+                _ => 0,
+            })
+            .sum()
     }
 }
