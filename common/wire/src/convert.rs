@@ -4,7 +4,10 @@
 //! lie inside the limits, digests have 32 bytes, texts are short and printable.
 
 use model::rect::SIDE_MAX;
-use model::{AttemptId, Digest, Epoch, FrameRange, Rect, SubmissionId, WorkerId};
+use model::{
+    AttemptId, Digest, Epoch, FrameRange, ImageNumber, ImageRef, JobId, Lease, Rect, Running, Span,
+    SubmissionId, WorkerId,
+};
 
 use crate::proto;
 
@@ -244,6 +247,61 @@ impl TryFrom<proto::FrameRange> for FrameRange {
 
     fn try_from(frames: proto::FrameRange) -> Result<Self, BadMessage> {
         Self::new(frames.start, frames.end, frames.step).map_err(BadMessage::Frames)
+    }
+}
+
+/// Most blocks that a lease may name: those of the largest tile.
+const WANTED_MAX: usize = 1 << 20;
+
+impl From<Lease> for proto::Lease {
+    fn from(lease: Lease) -> Self {
+        Self {
+            attempt: Some(lease.attempt.into()),
+            job: lease.image.job.0,
+            image: lease.image.image.0,
+            tile: Some(lease.tile.into()),
+            blocks: lease.wanted.into_iter().map(Into::into).collect(),
+            description_digest: lease.scene.0.to_vec(),
+            expected_us: lease.expected.0,
+        }
+    }
+}
+
+impl TryFrom<proto::Lease> for Lease {
+    type Error = BadMessage;
+
+    fn try_from(lease: proto::Lease) -> Result<Self, BadMessage> {
+        Ok(Self {
+            attempt: require(lease.attempt, "lease.attempt")?.try_into()?,
+            image: ImageRef {
+                job: JobId(lease.job),
+                image: ImageNumber(lease.image),
+            },
+            scene: digest(&lease.description_digest, "lease.description_digest")?,
+            tile: require(lease.tile, "lease.tile")?.try_into()?,
+            wanted: list(lease.blocks, "lease.blocks", WANTED_MAX)?,
+            expected: Span(lease.expected_us),
+        })
+    }
+}
+
+impl From<Running> for proto::Running {
+    fn from(running: Running) -> Self {
+        Self {
+            attempt: Some(running.attempt.into()),
+            blocks: running.blocks,
+        }
+    }
+}
+
+impl TryFrom<proto::Running> for Running {
+    type Error = BadMessage;
+
+    fn try_from(running: proto::Running) -> Result<Self, BadMessage> {
+        Ok(Self {
+            attempt: require(running.attempt, "running.attempt")?.try_into()?,
+            blocks: running.blocks,
+        })
     }
 }
 

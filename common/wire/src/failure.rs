@@ -100,7 +100,7 @@ mod grpc {
             ErrorKind::Unspecified => Code::Unknown,
             ErrorKind::BadRequest | ErrorKind::BadScene => Code::InvalidArgument,
             ErrorKind::DigestMismatch => Code::DataLoss,
-            ErrorKind::NotFound => Code::NotFound,
+            ErrorKind::NotFound | ErrorKind::AttemptDead => Code::NotFound,
             ErrorKind::Unauthenticated => Code::Unauthenticated,
             ErrorKind::Limit => Code::ResourceExhausted,
             ErrorKind::WrongProtocol | ErrorKind::WrongRevision => Code::FailedPrecondition,

@@ -6,6 +6,7 @@
 //! - [`block`]: the block record, the same bytes wherever finished pixels travel.
 //! - [`failure`]: why a call failed: a kind, whether to try again, a sentence.
 //! - [`auth`]: the token that guards a coordinator, as metadata.
+//! - [`place`]: the state folder's files through which the parts on one machine find each other.
 //! - [`version`]: which protocol versions two sides can speak.
 //! - `link` (feature `grpc`): the settings that both ends of a connection share.
 //!
@@ -18,6 +19,8 @@ pub mod convert;
 pub mod failure;
 #[cfg(feature = "grpc")]
 pub mod link;
+#[cfg(feature = "grpc")]
+pub mod place;
 pub mod version;
 
 /// The messages and service stubs of `proto/flyby/v1`.

@@ -34,9 +34,6 @@ pub const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(20);
 /// How long opening a connection may take.
 pub const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Largest scene description.
-pub const DESCRIPTION_BYTES_MAX: u64 = 64 << 20;
-
 /// Largest asset.
 pub const ASSET_BYTES_MAX: u64 = 256 << 20;
 

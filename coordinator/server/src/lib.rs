@@ -1,1 +1,30 @@
-//! (empty)
+//! The coordinator: the only clock, runtime and disk around the scheduler.
+//!
+//! One loop (`shell`) owns the scheduler: it waits for whichever input is first, turns it
+//! into an event, lets the scheduler decide, and performs the effects. Around it:
+//!
+//! - `state`: the state folder, its lock, token and epoch.
+//! - `grpc`: messages in and out; here generated types begin and end.
+//! - `inbox`: submissions as they arrive, checked against their digests.
+//! - `storage`: a thread that writes blocks at their place and makes them durable, many at a
+//!   time, and one that encodes finished images.
+//! - `job`, `worker`: what is known of them beside what the scheduler knows: log, files,
+//!   watchers; links.
+//!
+//! It names no worker's code: they meet in `wire`. `agent`'s `tests/farm.rs` shows the whole.
+
+mod clock;
+mod config;
+mod grpc;
+mod inbox;
+mod input;
+mod job;
+mod shell;
+mod start;
+mod state;
+mod storage;
+mod worker;
+
+pub use config::{Config, Limits};
+pub use start::{Running, StartError, start};
+pub use state::StateError;

@@ -1,0 +1,136 @@
+//! Messages in and out: where generated types begin and end.
+//!
+//! Each call is checked here, turned into an input of the loop, and answered. Nothing in
+//! here decides anything about the farm.
+
+mod bytes;
+mod control;
+mod delivery;
+mod user;
+mod workers;
+
+use std::future::Future;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::Duration;
+
+use sched::LinkId;
+use tokio::net::TcpListener;
+use tokio::sync::{Semaphore, mpsc, oneshot};
+use tonic::service::interceptor::InterceptedService;
+use tonic::transport::Server;
+use tonic::transport::server::TcpIncoming;
+use tonic::{Request, Status};
+use wire::Failure;
+use wire::auth::Token;
+use wire::link;
+use wire::proto::farm_server::FarmServer;
+use wire::proto::workers_server::WorkersServer;
+use wire::proto::{self, ErrorKind};
+
+use crate::config::Config;
+use crate::inbox::Inbox;
+use crate::input::{Input, Reply};
+use crate::state::State;
+
+/// Most calls at the same time on one connection.
+const STREAMS_MAX: u32 = 256;
+
+/// How long whoever opens a stream may take to say who it is.
+const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
+
+/// What every call needs.
+#[derive(Debug)]
+pub(crate) struct Door {
+    inputs: mpsc::Sender<Input>,
+    config: Arc<Config>,
+    inbox: Inbox,
+    submissions: Arc<Semaphore>,
+    blocks: Arc<Semaphore>,
+    watchers: Arc<Semaphore>,
+    next_link: AtomicU64,
+}
+
+impl Door {
+    pub(crate) fn new(inputs: mpsc::Sender<Input>, config: Arc<Config>, state: &State) -> Self {
+        let limits = &config.limits;
+        Self {
+            inputs,
+            inbox: Inbox::new(state.inbox(), limits.asset_bytes_max),
+            submissions: Arc::new(Semaphore::new(limits.submissions_max)),
+            blocks: Arc::new(Semaphore::new(limits.blocks_in_flight_max)),
+            watchers: Arc::new(Semaphore::new(limits.watchers_max)),
+            next_link: AtomicU64::new(1),
+            config,
+        }
+    }
+
+    /// Hands something to the loop.
+    async fn feed(&self, input: Input) -> Result<(), Failure> {
+        self.inputs.send(input).await.map_err(|_| stopping())
+    }
+
+    /// Asks the loop, and waits for its answer.
+    async fn ask<T>(&self, input: impl FnOnce(Reply<T>) -> Input) -> Result<T, Failure> {
+        let (reply, answer) = oneshot::channel();
+        self.feed(input(reply)).await?;
+        answer.await.unwrap_or_else(|_| Err(stopping()))
+    }
+
+    fn next_link(&self) -> LinkId {
+        LinkId(self.next_link.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
+fn stopping() -> Failure {
+    Failure::later(ErrorKind::Stopping, "the coordinator is stopping")
+}
+
+/// Serves until `stop` is there and every stream has ended.
+pub(crate) async fn serve(
+    listener: TcpListener,
+    token: Token,
+    door: Arc<Door>,
+    stop: impl Future<Output = ()>,
+) -> Result<(), tonic::transport::Error> {
+    let check = move |request: Request<()>| match token.check(request.metadata()) {
+        Ok(()) => Ok(request),
+        Err(failure) => Err(Status::from(failure)),
+    };
+    let farm = FarmServer::from_arc(door.clone())
+        .max_decoding_message_size(link::MESSAGE_BYTES_MAX)
+        .max_encoding_message_size(link::MESSAGE_BYTES_MAX);
+    let workers = WorkersServer::from_arc(door)
+        .max_decoding_message_size(link::MESSAGE_BYTES_MAX)
+        .max_encoding_message_size(link::MESSAGE_BYTES_MAX);
+    Server::builder()
+        .initial_connection_window_size(link::CONNECTION_WINDOW_BYTES)
+        .initial_stream_window_size(link::STREAM_WINDOW_BYTES)
+        .max_concurrent_streams(STREAMS_MAX)
+        .http2_keepalive_interval(Some(link::KEEPALIVE_INTERVAL))
+        .http2_keepalive_timeout(Some(link::KEEPALIVE_TIMEOUT))
+        .add_service(InterceptedService::new(farm, check.clone()))
+        .add_service(InterceptedService::new(workers, check))
+        .serve_with_incoming_shutdown(TcpIncoming::from(listener).with_nodelay(Some(true)), stop)
+        .await
+}
+
+/// A format as a message names it.
+pub(crate) fn format_message(format: image::Format) -> proto::FrameFormat {
+    match format {
+        image::Format::Exr => proto::FrameFormat::Exr,
+        image::Format::Png8 => proto::FrameFormat::Png8,
+        image::Format::Png16 => proto::FrameFormat::Png16,
+        image::Format::Ppm => proto::FrameFormat::Ppm,
+    }
+}
+
+/// The format that a message names.
+pub(crate) fn format(message: proto::FrameFormat) -> image::Format {
+    match message {
+        proto::FrameFormat::Unspecified | proto::FrameFormat::Exr => image::Format::Exr,
+        proto::FrameFormat::Png8 => image::Format::Png8,
+        proto::FrameFormat::Png16 => image::Format::Png16,
+        proto::FrameFormat::Ppm => image::Format::Ppm,
+    }
+}

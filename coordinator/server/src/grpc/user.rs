@@ -1,0 +1,197 @@
+//! The user's calls.
+
+use std::sync::Arc;
+
+use model::{ImageNumber, JobId};
+use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc};
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Request, Response, Status, Streaming};
+use wire::Failure;
+use wire::proto::farm_server::Farm;
+use wire::proto::{self, ErrorKind};
+
+use super::Door;
+use super::bytes::{Chunks, send_file};
+use crate::input::{Input, Query, Snapshot};
+
+/// Updates that wait for one watcher; what follows waits in the job's own channel.
+const UPDATES_AHEAD: usize = 4;
+
+type Answer<T> = Result<Response<T>, Status>;
+
+#[tonic::async_trait]
+impl Farm for Door {
+    async fn submit(
+        &self,
+        request: Request<Streaming<proto::SubmitPart>>,
+    ) -> Answer<proto::Submitted> {
+        let _permit = self.submissions.try_acquire().map_err(|_| {
+            Failure::later(
+                ErrorKind::Limit,
+                "as many submissions as may are arriving already; try again in a moment",
+            )
+        })?;
+        let mut parts = request.into_inner();
+        let new = self.inbox.receive(self.config.revision, &mut parts).await?;
+        let submitted = self
+            .ask(|reply| Input::Submit(Box::new(new), reply))
+            .await?;
+        Ok(Response::new(submitted))
+    }
+
+    async fn list_jobs(&self, _: Request<proto::ListJobsRequest>) -> Answer<proto::JobList> {
+        let jobs = self.ask(|reply| Input::Ask(Query::Jobs(reply))).await?;
+        Ok(Response::new(jobs))
+    }
+
+    type ShowJobStream = Chunks<proto::JobUpdate>;
+
+    async fn show_job(&self, request: Request<proto::JobRequest>) -> Answer<Self::ShowJobStream> {
+        let job = JobId(request.get_ref().job);
+        let snapshot = self.ask(|reply| Input::Ask(Query::Job(job, reply))).await?;
+        let (sender, updates) = mpsc::channel(UPDATES_AHEAD);
+        tokio::spawn(async move {
+            let _ = send_parts(&sender, snapshot.parts).await;
+        });
+        Ok(Response::new(ReceiverStream::new(updates)))
+    }
+
+    type WatchJobStream = Chunks<proto::JobUpdate>;
+
+    async fn watch_job(&self, request: Request<proto::JobRequest>) -> Answer<Self::WatchJobStream> {
+        let job = JobId(request.get_ref().job);
+        let permit = self.watchers.clone().try_acquire_owned().map_err(|_| {
+            Failure::later(
+                ErrorKind::Limit,
+                "as many watchers as may are watching already",
+            )
+        })?;
+        let snapshot = self.ask(|reply| Input::Ask(Query::Job(job, reply))).await?;
+        let (sender, updates) = mpsc::channel(UPDATES_AHEAD);
+        let inputs = self.inputs.clone();
+        tokio::spawn(watch(job, snapshot, inputs, sender, permit));
+        Ok(Response::new(ReceiverStream::new(updates)))
+    }
+
+    async fn job_log(&self, request: Request<proto::JobRequest>) -> Answer<proto::JobLogReply> {
+        let job = JobId(request.get_ref().job);
+        let log = self.ask(|reply| Input::Ask(Query::Log(job, reply))).await?;
+        Ok(Response::new(log))
+    }
+
+    async fn cancel_job(&self, request: Request<proto::JobRequest>) -> Answer<proto::JobSummary> {
+        let job = JobId(request.get_ref().job);
+        let summary = self.ask(|reply| Input::Cancel(job, reply)).await?;
+        Ok(Response::new(summary))
+    }
+
+    type FetchFrameStream = Chunks<proto::FrameChunk>;
+
+    async fn fetch_frame(
+        &self,
+        request: Request<proto::FetchFrameRequest>,
+    ) -> Answer<Self::FetchFrameStream> {
+        let request = request.get_ref();
+        let (job, image) = (JobId(request.job), ImageNumber(request.image));
+        let format = proto::FrameFormat::try_from(request.format).map_err(|_| {
+            Failure::new(
+                ErrorKind::BadRequest,
+                format!("frame format {} is not known here", request.format),
+            )
+        })?;
+        let format = super::format(format);
+        let (path, file) = self
+            .ask(|reply| Input::Ask(Query::Frame(job, image, format, reply)))
+            .await?;
+        let chunks = send_file(path, move |_, place, data| proto::FrameChunk {
+            file: (place == 0).then(|| file.clone()),
+            data,
+        });
+        Ok(Response::new(chunks.await?))
+    }
+
+    async fn list_workers(
+        &self,
+        _: Request<proto::ListWorkersRequest>,
+    ) -> Answer<proto::WorkerList> {
+        let workers = self.ask(|reply| Input::Ask(Query::Workers(reply))).await?;
+        Ok(Response::new(workers))
+    }
+
+    async fn info(&self, _: Request<proto::InfoRequest>) -> Answer<proto::FarmInfo> {
+        let info = self.ask(|reply| Input::Ask(Query::Info(reply))).await?;
+        Ok(Response::new(info))
+    }
+}
+
+/// Sends a snapshot and what follows it, until the job is over or the watcher leaves. A watcher
+/// that fell behind gets a fresh snapshot.
+async fn watch(
+    job: JobId,
+    mut snapshot: Snapshot,
+    inputs: mpsc::Sender<Input>,
+    sender: mpsc::Sender<Result<proto::JobUpdate, Status>>,
+    _permit: OwnedSemaphorePermit,
+) {
+    loop {
+        if send_parts(&sender, snapshot.parts).await.is_err() {
+            return;
+        }
+        let Some(changes) = snapshot.changes else {
+            return;
+        };
+        match follow(changes, &sender).await {
+            Followed::ToItsEnd => return,
+            Followed::FellBehind => {}
+        }
+        let (reply, answer) = tokio::sync::oneshot::channel();
+        let asked = inputs.send(Input::Ask(Query::Job(job, reply))).await;
+        snapshot = match (asked, answer.await) {
+            (Ok(()), Ok(Ok(snapshot))) => snapshot,
+            (Ok(()), Ok(Err(failure))) => {
+                let _ = sender.send(Err(failure.into())).await;
+                return;
+            }
+            _ => return,
+        };
+    }
+}
+
+/// How following a job's changes ended.
+enum Followed {
+    /// The job is over, or the watcher left.
+    ToItsEnd,
+    /// Changes were dropped.
+    FellBehind,
+}
+
+async fn follow(
+    mut changes: broadcast::Receiver<Arc<proto::JobUpdate>>,
+    sender: &mpsc::Sender<Result<proto::JobUpdate, Status>>,
+) -> Followed {
+    loop {
+        let change = tokio::select! {
+            change = changes.recv() => change,
+            () = sender.closed() => return Followed::ToItsEnd,
+        };
+        match change {
+            Ok(update) => {
+                if sender.send(Ok((*update).clone())).await.is_err() {
+                    return Followed::ToItsEnd;
+                }
+            }
+            Err(broadcast::error::RecvError::Lagged(_)) => return Followed::FellBehind,
+            Err(broadcast::error::RecvError::Closed) => return Followed::ToItsEnd,
+        }
+    }
+}
+
+async fn send_parts(
+    sender: &mpsc::Sender<Result<proto::JobUpdate, Status>>,
+    parts: Vec<proto::JobUpdate>,
+) -> Result<(), mpsc::error::SendError<Result<proto::JobUpdate, Status>>> {
+    for part in parts {
+        sender.send(Ok(part)).await?;
+    }
+    Ok(())
+}

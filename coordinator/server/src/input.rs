@@ -1,0 +1,161 @@
+//! Everything that reaches the loop.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use bytes::Bytes;
+use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
+use sched::{BlockRef, Event, LinkId};
+use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc, oneshot};
+use tonic::Status;
+use wire::Failure;
+use wire::proto;
+
+use crate::inbox::NewJob;
+use crate::storage::{Encoded, Stored};
+
+/// Where an answer goes; whoever asked may have left.
+pub(crate) type Reply<T> = oneshot::Sender<Result<T, Failure>>;
+
+/// What the loop waits for. Each is small, or carries what its sender's limits bound.
+#[derive(Debug)]
+pub(crate) enum Input {
+    /// A submission has arrived whole.
+    Submit(Box<NewJob>, Reply<proto::Submitted>),
+    /// A user ends a job.
+    Cancel(JobId, Reply<proto::JobSummary>),
+    /// A question; changes nothing.
+    Ask(Query),
+    /// A worker said hello.
+    Hello(Box<Greeting>),
+    /// A worker said something on a control stream.
+    Said {
+        /// Which worker.
+        worker: WorkerId,
+        /// On which stream; counts only if it is the worker's newest.
+        link: LinkId,
+        /// What.
+        event: Event,
+    },
+    /// A worker's delivery stream opened.
+    Delivering {
+        /// Which worker.
+        worker: WorkerId,
+        /// In which epoch it was welcomed.
+        epoch: u64,
+        /// The stream.
+        link: Link<proto::DeliverDown>,
+        /// Whether it may.
+        reply: Reply<()>,
+    },
+    /// A block arrived.
+    Block(Box<Arrived>),
+    /// A delivery stream ended.
+    DeliveryClosed {
+        /// Which worker.
+        worker: WorkerId,
+        /// Which stream.
+        link: LinkId,
+    },
+    /// Blocks are durable, or could not be made so.
+    Stored(Vec<Stored>),
+    /// An image is encoded, or could not be.
+    Encoded(Encoded),
+    /// End: tell everybody, and leave the loop.
+    Stop,
+}
+
+/// A question that changes nothing.
+#[derive(Debug)]
+pub(crate) enum Query {
+    /// All jobs.
+    Jobs(Reply<proto::JobList>),
+    /// One job and, from then on, its changes.
+    Job(JobId, Reply<Snapshot>),
+    /// A job's log.
+    Log(JobId, Reply<proto::JobLogReply>),
+    /// Where a finished file is.
+    Frame(
+        JobId,
+        ImageNumber,
+        image::Format,
+        Reply<(PathBuf, proto::FrameFile)>,
+    ),
+    /// Where a scene's or an asset's bytes are.
+    Bytes(Digest, Wanted, Reply<PathBuf>),
+    /// All workers.
+    Workers(Reply<proto::WorkerList>),
+    /// The farm.
+    Info(Reply<proto::FarmInfo>),
+}
+
+/// What is fetched by digest.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Wanted {
+    /// A scene description.
+    Scene,
+    /// An asset.
+    Asset,
+}
+
+/// A job at one instant, and what follows; nothing follows where it is over.
+#[derive(Debug)]
+pub(crate) struct Snapshot {
+    /// Its parts, in order.
+    pub(crate) parts: Vec<proto::JobUpdate>,
+    /// Its changes from then on.
+    pub(crate) changes: Option<broadcast::Receiver<Arc<proto::JobUpdate>>>,
+}
+
+/// The loop's end of a stream to a worker. Dropping it ends both directions.
+#[derive(Debug)]
+pub(crate) struct Link<T> {
+    /// Which stream; a newer one has a larger number.
+    pub(crate) id: LinkId,
+    /// What the worker is told.
+    pub(crate) down: mpsc::Sender<Result<T, Status>>,
+    /// Dropped with the link: whoever reads the other direction then stops.
+    pub(crate) _alive: oneshot::Sender<()>,
+}
+
+/// A worker's hello, checked.
+#[derive(Debug)]
+pub(crate) struct Greeting {
+    pub(crate) worker: WorkerId,
+    pub(crate) link: Link<proto::ControlDown>,
+    pub(crate) protocol: u32,
+    pub(crate) revision: Revision,
+    pub(crate) threads: u32,
+    pub(crate) held: Vec<model::AttemptId>,
+    pub(crate) about: AboutWorker,
+}
+
+/// What a worker says of itself, for people.
+#[derive(Clone, Debug)]
+pub(crate) struct AboutWorker {
+    pub(crate) name: String,
+    pub(crate) build: String,
+    pub(crate) simd_level: String,
+    pub(crate) memory_bytes: u64,
+}
+
+/// A block whose record is whole.
+#[derive(Debug)]
+pub(crate) struct Arrived {
+    pub(crate) worker: WorkerId,
+    pub(crate) block: BlockRef,
+    /// The record's payload.
+    pub(crate) payload: Bytes,
+    /// How long one thread took.
+    pub(crate) elapsed: Span,
+    /// What was counted.
+    pub(crate) counters: Vec<(String, u64)>,
+    /// Held until the block is durable or refused, so that only so many are under way.
+    pub(crate) permit: OwnedSemaphorePermit,
+}
+
+impl Arrived {
+    pub(crate) fn image(&self) -> ImageRef {
+        self.block.image
+    }
+}

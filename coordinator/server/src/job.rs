@@ -1,0 +1,287 @@
+//! What a user sees of a job beside what the scheduler knows: its log, its files, its watchers.
+
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
+
+use image::Formats;
+use model::{ImageNumber, ImageRef, JobId, SubmissionId};
+use tokio::sync::broadcast;
+use wire::proto;
+
+use crate::inbox::Upload;
+use crate::state::JobFolders;
+use crate::storage::Plan;
+
+/// Most names of counters of one job; workers that invent more are not counted.
+const COUNTERS_MAX: usize = 64;
+
+/// Changes that a watcher may be behind before it gets a fresh snapshot.
+const WATCHER_BEHIND_MAX: usize = 64;
+
+/// Most images in one message.
+pub(crate) const IMAGES_PER_MESSAGE: usize = 1_000;
+
+/// Sums by name.
+pub(crate) type Counters = BTreeMap<String, u64>;
+
+/// One job.
+#[derive(Debug)]
+pub(crate) struct Job {
+    /// The submission it came from.
+    pub(crate) submission: SubmissionId,
+    /// How its images are stored.
+    pub(crate) plan: Arc<Plan>,
+    /// Its scene and assets on disk, until it is over.
+    pub(crate) upload: Option<Upload>,
+    /// Its files, by image.
+    pub(crate) files: BTreeMap<ImageNumber, Vec<proto::FrameFile>>,
+    /// Sums over all its blocks.
+    pub(crate) counters: Counters,
+    /// Sums over the blocks of each image that is being rendered.
+    image_counters: BTreeMap<ImageNumber, Counters>,
+    log: Log,
+    watchers: Option<broadcast::Sender<Arc<proto::JobUpdate>>>,
+    changed: BTreeSet<ImageNumber>,
+    /// Images of which a tile was leased.
+    begun: BTreeSet<ImageNumber>,
+    new_lines: Vec<proto::LogLine>,
+    /// Attempts lost and failed that its log already tells of.
+    pub(crate) told: (u64, u64),
+}
+
+impl Job {
+    pub(crate) fn new(
+        plan: Arc<Plan>,
+        upload: Upload,
+        submission: SubmissionId,
+        lines: usize,
+    ) -> Self {
+        Self {
+            submission,
+            plan,
+            upload: Some(upload),
+            files: BTreeMap::new(),
+            counters: Counters::new(),
+            image_counters: BTreeMap::new(),
+            log: Log::new(lines),
+            watchers: Some(broadcast::Sender::new(WATCHER_BEHIND_MAX)),
+            changed: BTreeSet::new(),
+            begun: BTreeSet::new(),
+            new_lines: Vec::new(),
+            told: (0, 0),
+        }
+    }
+
+    pub(crate) fn folders(&self) -> &JobFolders {
+        &self.plan.folders
+    }
+
+    pub(crate) fn formats(&self) -> Formats {
+        self.plan.formats
+    }
+
+    /// Adds what was counted while a block was rendered that is now durable.
+    pub(crate) fn count(&mut self, image: ImageNumber, counters: &[(String, u64)]) {
+        let of_image = self.image_counters.entry(image).or_default();
+        for sums in [of_image, &mut self.counters] {
+            for (name, value) in counters {
+                if let Some(sum) = sums.get_mut(name) {
+                    *sum = sum.saturating_add(*value);
+                } else if sums.len() < COUNTERS_MAX {
+                    sums.insert(name.clone(), *value);
+                }
+            }
+        }
+    }
+
+    /// Notes that a tile of an image is leased; whether it is the first.
+    pub(crate) fn begin(&mut self, image: ImageNumber) -> bool {
+        self.begun.insert(image)
+    }
+
+    /// The sums of an image that is complete or dropped; they are kept no longer.
+    pub(crate) fn take_counters(&mut self, image: ImageNumber) -> Counters {
+        self.image_counters.remove(&image).unwrap_or_default()
+    }
+
+    /// Adds a line to its log.
+    pub(crate) fn say(&mut self, unix_ms: u64, text: String) {
+        let line = proto::LogLine { unix_ms, text };
+        if self.has_watchers() {
+            self.new_lines.push(line.clone());
+        }
+        self.log.push(line);
+    }
+
+    /// Its log as it stands.
+    pub(crate) fn log(&self) -> proto::JobLogReply {
+        proto::JobLogReply {
+            lines: self.log.lines.iter().cloned().collect(),
+            dropped: self.log.dropped,
+        }
+    }
+
+    /// Notes that watchers should see an image anew.
+    pub(crate) fn touch(&mut self, image: ImageNumber) {
+        if self.has_watchers() {
+            self.changed.insert(image);
+        }
+    }
+
+    /// A watcher's end; `None` where no change will follow.
+    pub(crate) fn watch(&self) -> Option<broadcast::Receiver<Arc<proto::JobUpdate>>> {
+        self.watchers.as_ref().map(broadcast::Sender::subscribe)
+    }
+
+    fn has_watchers(&self) -> bool {
+        let count = self
+            .watchers
+            .as_ref()
+            .map(broadcast::Sender::receiver_count);
+        count.is_some_and(|count| count > 0)
+    }
+
+    /// Tells watchers what changed. `status` gives an image as it is now.
+    pub(crate) fn tell_watchers(
+        &mut self,
+        summary: proto::JobSummary,
+        status: impl Fn(&Self, ImageNumber) -> Option<proto::ImageStatus>,
+    ) {
+        let changed = std::mem::take(&mut self.changed);
+        let mut lines = std::mem::take(&mut self.new_lines);
+        let Some(watchers) = self.watchers.as_ref().filter(|_| self.has_watchers()) else {
+            return;
+        };
+        let images: Vec<_> = changed
+            .into_iter()
+            .filter_map(|image| status(self, image))
+            .collect();
+        let mut batches: Vec<_> = images
+            .chunks(IMAGES_PER_MESSAGE)
+            .map(<[_]>::to_vec)
+            .collect();
+        if batches.is_empty() {
+            batches.push(Vec::new());
+        }
+        for images in batches {
+            let delta = proto::JobDelta {
+                summary: Some(summary.clone()),
+                images,
+                lines: std::mem::take(&mut lines),
+            };
+            // An error says that the last watcher has just left.
+            let _ = watchers.send(Arc::new(proto::JobUpdate {
+                update: Some(proto::job_update::Update::Delta(delta)),
+            }));
+        }
+    }
+
+    /// Ends all watching: nothing will change any more.
+    pub(crate) fn dismiss_watchers(&mut self) {
+        self.watchers = None;
+    }
+}
+
+/// The latest lines, and how many came before.
+#[derive(Debug)]
+struct Log {
+    lines: VecDeque<proto::LogLine>,
+    lines_max: usize,
+    dropped: u64,
+}
+
+impl Log {
+    fn new(lines_max: usize) -> Self {
+        Self {
+            lines: VecDeque::new(),
+            lines_max: lines_max.max(1),
+            dropped: 0,
+        }
+    }
+
+    fn push(&mut self, line: proto::LogLine) {
+        if self.lines.len() == self.lines_max {
+            self.lines.pop_front();
+            self.dropped += 1;
+        }
+        self.lines.push_back(line);
+    }
+}
+
+/// Jobs, by number.
+#[derive(Debug, Default)]
+pub(crate) struct Jobs {
+    by_id: BTreeMap<JobId, Job>,
+    /// Those of which watchers have not seen everything.
+    dirty: BTreeSet<JobId>,
+}
+
+impl Jobs {
+    pub(crate) fn get(&self, job: JobId) -> Option<&Job> {
+        self.by_id.get(&job)
+    }
+
+    pub(crate) fn get_mut(&mut self, job: JobId) -> Option<&mut Job> {
+        self.by_id.get_mut(&job)
+    }
+
+    pub(crate) fn insert(&mut self, id: JobId, job: Job) {
+        self.by_id.insert(id, job);
+    }
+
+    pub(crate) fn remove(&mut self, job: JobId) -> Option<Job> {
+        self.dirty.remove(&job);
+        self.by_id.remove(&job)
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (JobId, &Job)> {
+        self.by_id.iter().map(|(id, job)| (*id, job))
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.by_id.len()
+    }
+
+    /// Notes that something of a job changed.
+    pub(crate) fn touch(&mut self, job: JobId) {
+        if self.by_id.contains_key(&job) {
+            self.dirty.insert(job);
+        }
+    }
+
+    /// Notes that an image changed.
+    pub(crate) fn touch_image(&mut self, image: ImageRef) {
+        if let Some(job) = self.by_id.get_mut(&image.job) {
+            job.touch(image.image);
+            self.dirty.insert(image.job);
+        }
+    }
+
+    pub(crate) fn has_dirty(&self) -> bool {
+        !self.dirty.is_empty()
+    }
+
+    /// The jobs of which watchers have not seen everything; from now on none.
+    pub(crate) fn take_dirty(&mut self) -> BTreeSet<JobId> {
+        std::mem::take(&mut self.dirty)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_log_keeps_the_latest_lines() {
+        let mut log = Log::new(3);
+        for unix_ms in 0..5 {
+            log.push(proto::LogLine {
+                unix_ms,
+                text: String::new(),
+            });
+        }
+        assert_eq!(log.dropped, 2);
+        let left: Vec<_> = log.lines.iter().map(|line| line.unix_ms).collect();
+        assert_eq!(left, [2, 3, 4]);
+    }
+}

@@ -1,0 +1,240 @@
+//! From inputs to events.
+
+use model::WorkerId;
+use sched::{Event, LinkId, Verdict};
+use wire::proto::{self, ErrorKind, deliver_down};
+use wire::{Failure, convert};
+
+use super::{Next, Shell};
+use crate::inbox::NewJob;
+use crate::input::{Arrived, Greeting, Input, Link, Reply};
+use crate::storage::{Encoded, Refusal, Stored};
+use crate::worker::Worker;
+
+impl Shell {
+    /// Takes one input.
+    pub(super) fn take(&mut self, input: Input) -> Next {
+        match input {
+            Input::Submit(new, reply) => self.submit(new, reply),
+            Input::Cancel(job, reply) => {
+                let known = self.sched.job(job).is_some();
+                if known {
+                    self.feed(Event::Cancel { job });
+                }
+                let _ = reply.send(self.summary(job).ok_or_else(|| super::views::no_job(job)));
+            }
+            Input::Ask(query) => self.answer(query),
+            Input::Hello(greeting) => self.greet(*greeting),
+            Input::Said {
+                worker,
+                link,
+                event,
+            } => self.said(worker, link, event),
+            Input::Delivering {
+                worker,
+                epoch,
+                link,
+                reply,
+            } => {
+                let _ = reply.send(self.open_delivery(worker, epoch, link));
+            }
+            Input::Block(arrived) => self.block(arrived),
+            Input::DeliveryClosed { worker, link } => {
+                if let Some(worker) = self.workers.get_mut(&worker)
+                    && worker.delivery.as_ref().is_some_and(|open| open.id == link)
+                {
+                    worker.delivery = None;
+                }
+            }
+            Input::Stored(group) => {
+                for stored in group {
+                    self.stored(stored);
+                }
+            }
+            Input::Encoded(encoded) => self.encoded(encoded),
+            Input::Stop => return Next::Stop,
+        }
+        Next::GoOn
+    }
+
+    fn submit(&mut self, new: Box<NewJob>, reply: Reply<proto::Submitted>) {
+        let submission = new.submission.clone();
+        self.submitting = Some((submission.submission, new, reply));
+        self.feed(Event::Submit(submission));
+        if let Some((_, _, reply)) = self.submitting.take() {
+            let mistake = "the scheduler did not answer the submission";
+            let _ = reply.send(Err(Failure::new(ErrorKind::Internal, mistake)));
+        }
+    }
+
+    fn greet(&mut self, greeting: Greeting) {
+        let Greeting {
+            worker,
+            link,
+            protocol,
+            revision,
+            threads,
+            held,
+            about,
+        } = greeting;
+        tracing::info!(%worker, name = about.name, threads, "a worker says hello");
+        let event = Event::WorkerJoined {
+            worker,
+            link: link.id,
+            revision,
+            threads,
+            held,
+        };
+        // An older link of the same process is dropped with its streams.
+        self.workers.insert(
+            worker,
+            Worker {
+                about,
+                protocol,
+                control: Some(link),
+                delivery: None,
+            },
+        );
+        self.feed(event);
+    }
+
+    fn said(&mut self, id: WorkerId, link: LinkId, event: Event) {
+        let Some(worker) = self.workers.get_mut(&id) else {
+            return;
+        };
+        if !worker.is_control(link) {
+            return;
+        }
+        match &event {
+            Event::LinkClosed { .. } => {
+                worker.control = None;
+                worker.delivery = None;
+                tracing::info!(worker = %id, "a worker's link closed");
+                self.tell_jobs_of_closed_link(id);
+            }
+            Event::TileFailed {
+                attempt, reason, ..
+            } => {
+                tracing::warn!(worker = %id, %attempt, reason, "a tile failed");
+                if let Some((_, image, tile)) = self.sched.attempt(*attempt) {
+                    let name = self.worker_name(id);
+                    self.say(
+                        image.job,
+                        format!(
+                            "frame {}: the tile at {},{} failed on worker {name}: {reason}",
+                            image.image, tile.x0, tile.y0
+                        ),
+                    );
+                }
+            }
+            _ => {}
+        }
+        self.feed(event);
+    }
+
+    fn open_delivery(
+        &mut self,
+        worker: WorkerId,
+        epoch: u64,
+        link: Link<proto::DeliverDown>,
+    ) -> Result<(), Failure> {
+        let ready = self
+            .workers
+            .get_mut(&worker)
+            .filter(|worker| worker.control.is_some())
+            .filter(|_| epoch == self.state.epoch().0);
+        let Some(worker) = ready else {
+            return Err(Failure::later(
+                ErrorKind::NotReady,
+                "the worker has no open control stream: it must say hello there first",
+            ));
+        };
+        worker.delivery = Some(link);
+        let welcome = proto::DeliverWelcome {};
+        worker.answer(deliver_down::Message::Welcome(welcome));
+        Ok(())
+    }
+
+    fn block(&mut self, arrived: Box<Arrived>) {
+        let (worker, block) = (arrived.worker, arrived.block);
+        match self.sched.accepts(worker, block) {
+            Verdict::Accept => match self.jobs.get(block.image.job) {
+                Some(job) => self.storage.store(job.plan.clone(), arrived),
+                None => tracing::error!(?block, "a block of a job that is not known"),
+            },
+            Verdict::AlreadyDone => self.feed(Event::BlockStored {
+                worker,
+                block,
+                elapsed: arrived.elapsed,
+            }),
+            Verdict::Refuse(refusal) => self.refuse_block(worker, block, refusal),
+        }
+    }
+
+    fn stored(&mut self, stored: Stored) {
+        let Stored { arrived, result } = stored;
+        let Arrived {
+            worker,
+            block,
+            elapsed,
+            counters,
+            ..
+        } = arrived;
+        match result {
+            Ok(()) => {
+                let wanted = self.sched.image(block.image);
+                let known = wanted.is_some_and(|image| image.state == sched::ImageState::Rendering);
+                if let Some(job) = self.jobs.get_mut(block.image.job).filter(|_| known) {
+                    job.count(block.image.image, &counters);
+                }
+                self.jobs.touch_image(block.image);
+                self.feed(Event::BlockStored {
+                    worker,
+                    block,
+                    elapsed,
+                });
+            }
+            Err(Refusal::Pixels(reason)) => {
+                let message = deliver_down::Message::Refused(proto::Refused {
+                    attempt: Some(block.attempt.into()),
+                    block: Some(block.rect.into()),
+                    error: Some(Failure::new(ErrorKind::BadRequest, &*reason).detail()),
+                });
+                if let Some(worker) = self.workers.get_mut(&worker) {
+                    worker.answer(message);
+                }
+            }
+            Err(Refusal::Disk(reason)) => {
+                tracing::error!(job = %block.image.job, image = %block.image.image, reason, "a block could not be stored");
+                self.fail_image(block.image, reason);
+            }
+        }
+    }
+
+    fn encoded(&mut self, encoded: Encoded) {
+        let Encoded { image, result } = encoded;
+        match result {
+            Ok(frame) => {
+                let files = frame.files.into_iter().map(super::views::file).collect();
+                let film = frame.film_digest;
+                if let Some(job) = self.jobs.get_mut(image.job) {
+                    job.files.insert(image.image, files);
+                    tracing::info!(job = %image.job, image = %image.image, %film, "a frame is finished");
+                    self.say(
+                        image.job,
+                        format!("frame {} is finished, film digest {film}", image.image),
+                    );
+                }
+                self.jobs.touch_image(image);
+                self.feed(Event::ImageEncoded { image, film });
+            }
+            Err(reason) => self.fail_image(image, reason),
+        }
+    }
+
+    fn fail_image(&mut self, image: model::ImageRef, reason: String) {
+        let reason = convert::sentence(&reason, 2_000);
+        self.jobs.touch_image(image);
+        self.feed(Event::ImageFailed { image, reason });
+    }
+}

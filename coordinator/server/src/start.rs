@@ -1,0 +1,154 @@
+//! Starting and stopping a coordinator.
+
+use std::io;
+use std::net::SocketAddr;
+use std::sync::Arc;
+use std::time::Duration;
+
+use model::Epoch;
+use tokio::net::TcpListener;
+use tokio::sync::{mpsc, oneshot};
+use tokio::task::JoinHandle;
+use wire::auth::Token;
+
+use crate::clock::Clock;
+use crate::config::Config;
+use crate::grpc::{self, Door};
+use crate::input::Input;
+use crate::shell::Shell;
+use crate::state::{State, StateError};
+use crate::storage::Storage;
+
+/// How long open streams may take to end once everybody was told that the coordinator stops.
+const STOP_TIMEOUT: Duration = Duration::from_secs(5);
+
+/// Why a coordinator did not start.
+#[derive(Debug, thiserror::Error)]
+pub enum StartError {
+    /// The address can be reached from other machines.
+    #[error(
+        "{0} can be reached from other machines, and there is no encryption yet: listen on \
+         127.0.0.1 or [::1]"
+    )]
+    NotLoopback(SocketAddr),
+    /// The state folder cannot be used.
+    #[error(transparent)]
+    State(#[from] StateError),
+    /// Another program listens there.
+    #[error("port {} is in use at {}: stop the other program, or choose another port", .0.port(), .0.ip())]
+    PortInUse(SocketAddr),
+    /// The system refused to listen.
+    #[error("cannot listen on {address}")]
+    Listen {
+        /// Where.
+        address: SocketAddr,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The system refused a thread.
+    #[error("cannot start a thread")]
+    Thread(#[source] io::Error),
+}
+
+/// A coordinator that runs. Dropping it without [`Running::shutdown`] leaves it running
+/// as long as the runtime does.
+#[derive(Debug)]
+pub struct Running {
+    address: SocketAddr,
+    epoch: Epoch,
+    token: Token,
+    inputs: mpsc::Sender<Input>,
+    stop: oneshot::Sender<()>,
+    shell: JoinHandle<()>,
+    server: JoinHandle<Result<(), tonic::transport::Error>>,
+}
+
+/// Starts a coordinator over a state folder.
+///
+/// Answers once it listens; from then on it runs on the runtime that this is called on, until
+/// [`Running::shutdown`].
+pub async fn start(config: Config) -> Result<Running, StartError> {
+    if !config.listen.ip().is_loopback() {
+        return Err(StartError::NotLoopback(config.listen));
+    }
+    let config = Arc::new(config);
+    let state = Arc::new(State::take(&config.state)?);
+    let listener = listen(config.listen).await?;
+    let address = listener.local_addr().map_err(|source| StartError::Listen {
+        address: config.listen,
+        source,
+    })?;
+    state.announce(address)?;
+
+    let (inputs, taken) = mpsc::channel(config.limits.inputs_max);
+    let storage = Storage::start(inputs.clone()).map_err(StartError::Thread)?;
+    let shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
+    let shell = tokio::spawn(shell.run(taken));
+    let door = Arc::new(Door::new(inputs.clone(), config, &state));
+    let (stop, stopped) = oneshot::channel();
+    let token = state.token().clone();
+    let server = tokio::spawn(grpc::serve(listener, token.clone(), door, async {
+        let _ = stopped.await;
+    }));
+    tracing::info!(
+        %address,
+        epoch = state.epoch().0,
+        "the coordinator listens; jobs live in its memory: what is not finished when it stops is \
+         forgotten, finished frames stay"
+    );
+    Ok(Running {
+        address,
+        epoch: state.epoch(),
+        token,
+        inputs,
+        stop,
+        shell,
+        server,
+    })
+}
+
+async fn listen(address: SocketAddr) -> Result<TcpListener, StartError> {
+    TcpListener::bind(address)
+        .await
+        .map_err(|source| match source.kind() {
+            io::ErrorKind::AddrInUse => StartError::PortInUse(address),
+            _ => StartError::Listen { address, source },
+        })
+}
+
+impl Running {
+    /// Where it listens.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// How often a coordinator was started over its state folder.
+    pub fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    /// Its token.
+    pub fn token(&self) -> &Token {
+        &self.token
+    }
+
+    /// Stops it: workers and watchers are told, scratch files are removed, finished
+    /// frames stay. Answers when everything has ended.
+    pub async fn shutdown(self) {
+        // An error says that the loop has ended already.
+        let _ = self.inputs.send(Input::Stop).await;
+        if self.shell.await.is_err() {
+            tracing::error!("the coordinator's loop died of a mistake in this program");
+        }
+        drop(self.stop);
+        drop(self.inputs);
+        let mut server = self.server;
+        if tokio::time::timeout(STOP_TIMEOUT, &mut server)
+            .await
+            .is_err()
+        {
+            server.abort();
+        }
+        tracing::info!("the coordinator has stopped");
+    }
+}

@@ -1,0 +1,370 @@
+//! The state folder: who may use it, and what outlives a coordinator.
+//!
+//! ```text
+//! lock               held while a coordinator runs
+//! token              64 hexadecimal digits, mode 0600
+//! epoch              how often a coordinator was started here
+//! coordinator.json   where the running one listens
+//! inbox/<n>/         submissions: scene and assets; of this start only
+//! jobs/<epoch>-<job>/frames/    finished frames; they stay
+//! jobs/<epoch>-<job>/scratch/   images being rendered; of this start only
+//! ```
+
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, Write as _};
+use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
+use std::path::{Path, PathBuf};
+
+use model::{Epoch, JobId};
+use wire::auth::Token;
+use wire::place::{COORDINATOR_FILE, Coordinator, TOKEN_FILE};
+
+/// Why a state folder cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum StateError {
+    /// Another coordinator holds it.
+    #[error(
+        "another coordinator runs over the state folder {}: stop it, or give this one a folder of its own",
+        .0.display()
+    )]
+    Locked(PathBuf),
+    /// Others may read the token.
+    #[error(
+        "the token {} has mode {mode:03o}, so that others can read it: `chmod 600` it, or remove it to get a new one",
+        path.display()
+    )]
+    TokenMode {
+        /// The token's file.
+        path: PathBuf,
+        /// Its mode.
+        mode: u32,
+    },
+    /// A file of it holds something else.
+    #[error("{} does not hold {expected}: remove it to start anew", path.display())]
+    Nonsense {
+        /// The file.
+        path: PathBuf,
+        /// What should be there.
+        expected: &'static str,
+    },
+    /// The system refused.
+    #[error("cannot {attempted} {}", path.display())]
+    Io {
+        /// What was attempted, as it stands after "cannot".
+        attempted: &'static str,
+        /// On which path.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// A state folder that this process holds.
+#[derive(Debug)]
+pub(crate) struct State {
+    root: PathBuf,
+    epoch: Epoch,
+    token: Token,
+    _lock: File,
+}
+
+/// The folders of one job.
+#[derive(Clone, Debug)]
+pub(crate) struct JobFolders {
+    /// What is left at the end.
+    pub(crate) frames: PathBuf,
+    /// What is not.
+    pub(crate) scratch: PathBuf,
+    root: PathBuf,
+}
+
+impl State {
+    /// Takes the folder: locks it, counts the start, makes the token if there
+    /// is none, removes what an earlier start left unfinished.
+    pub(crate) fn take(root: &Path) -> Result<Self, StateError> {
+        make_folder(root)?;
+        let lock = lock(root)?;
+        let state = Self {
+            epoch: next_epoch(root)?,
+            token: token(root)?,
+            root: root.to_owned(),
+            _lock: lock,
+        };
+        state.clean()?;
+        make_folder(&state.inbox())?;
+        make_folder(&state.root.join("jobs"))?;
+        Ok(state)
+    }
+
+    pub(crate) fn epoch(&self) -> Epoch {
+        self.epoch
+    }
+
+    pub(crate) fn token(&self) -> &Token {
+        &self.token
+    }
+
+    /// Where submissions arrive.
+    pub(crate) fn inbox(&self) -> PathBuf {
+        self.root.join("inbox")
+    }
+
+    /// A job's folders; nothing is made yet. Jobs are numbered anew at each start,
+    /// so the epoch is part of the name.
+    pub(crate) fn job(&self, job: JobId) -> JobFolders {
+        let root = self
+            .root
+            .join("jobs")
+            .join(format!("{}-{job}", self.epoch.0));
+        JobFolders {
+            frames: root.join("frames"),
+            scratch: root.join("scratch"),
+            root,
+        }
+    }
+
+    /// Says where this coordinator listens.
+    pub(crate) fn announce(&self, address: std::net::SocketAddr) -> Result<(), StateError> {
+        let path = self.root.join(COORDINATOR_FILE);
+        let coordinator = Coordinator {
+            address,
+            pid: std::process::id(),
+            epoch: self.epoch.0,
+        };
+        let text = serde_json::to_string(&coordinator).expect("an address is text");
+        replace(&path, text.as_bytes(), 0o644)
+    }
+
+    /// Takes that back; a file that is gone already is no error worth telling.
+    pub(crate) fn withdraw(&self) {
+        let _ = fs::remove_file(self.root.join(COORDINATOR_FILE));
+        let _ = fs::remove_dir_all(self.inbox());
+    }
+
+    /// Removes submissions and scratch files of earlier starts, whose jobs are
+    /// forgotten; finished frames stay.
+    fn clean(&self) -> Result<(), StateError> {
+        remove_all(&self.root.join(COORDINATOR_FILE))?;
+        remove_all(&self.inbox())?;
+        let jobs = self.root.join("jobs");
+        let listed = match fs::read_dir(&jobs) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
+            listed => listed.map_err(io_error("list", &jobs))?,
+        };
+        for job in listed {
+            let job = job.map_err(io_error("list", &jobs))?.path();
+            remove_all(&job.join("scratch"))?;
+            let frames = job.join("frames");
+            remove_unfinished(&frames);
+            // Both succeed only where nothing is left inside.
+            let _ = fs::remove_dir(&frames);
+            let _ = fs::remove_dir(&job);
+        }
+        Ok(())
+    }
+}
+
+impl JobFolders {
+    /// Makes both.
+    pub(crate) fn make(&self) -> Result<(), StateError> {
+        make_folder(&self.frames)?;
+        make_folder(&self.scratch)
+    }
+
+    /// Removes the scratch files, and the whole folder where it holds no frame.
+    pub(crate) fn clear(&self) -> Result<(), StateError> {
+        remove_all(&self.scratch)?;
+        let _ = fs::remove_dir(&self.frames);
+        let _ = fs::remove_dir(&self.root);
+        Ok(())
+    }
+}
+
+/// Frames that a killed coordinator was writing: hidden names, which no finished frame has.
+fn remove_unfinished(frames: &Path) {
+    let Ok(files) = fs::read_dir(frames) else {
+        return;
+    };
+    for file in files.flatten() {
+        if file.file_name().as_encoded_bytes().starts_with(b".") {
+            let _ = fs::remove_file(file.path());
+        }
+    }
+}
+
+fn lock(root: &Path) -> Result<File, StateError> {
+    let path = root.join("lock");
+    let file = OpenOptions::new()
+        .create(true)
+        .truncate(false)
+        .write(true)
+        .mode(0o600)
+        .open(&path)
+        .map_err(io_error("open", &path))?;
+    match file.try_lock() {
+        Ok(()) => Ok(file),
+        Err(TryLockError::WouldBlock) => Err(StateError::Locked(root.to_owned())),
+        Err(TryLockError::Error(error)) => Err(io_error("lock", &path)(error)),
+    }
+}
+
+/// Counts this start, durably before anyone sees the number.
+fn next_epoch(root: &Path) -> Result<Epoch, StateError> {
+    let path = root.join("epoch");
+    let nonsense = || StateError::Nonsense {
+        path: path.clone(),
+        expected: "a number",
+    };
+    let last = match fs::read_to_string(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => 0,
+        text => text
+            .map_err(io_error("read", &path))?
+            .trim()
+            .parse::<u64>()
+            .map_err(|_| nonsense())?,
+    };
+    let next = last.checked_add(1).ok_or_else(nonsense)?;
+    replace(&path, format!("{next}\n").as_bytes(), 0o600)?;
+    Ok(Epoch(next))
+}
+
+/// Reads the token, or makes one.
+fn token(root: &Path) -> Result<Token, StateError> {
+    let path = root.join(TOKEN_FILE);
+    let metadata = match fs::metadata(&path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => {
+            let mut bits = [0; 32];
+            getrandom::fill(&mut bits)
+                .map_err(|error| io_error("draw", &path)(io::Error::other(error.to_string())))?;
+            let token = Token::from_random(bits);
+            replace(&path, format!("{}\n", token.reveal()).as_bytes(), 0o600)?;
+            return Ok(token);
+        }
+        metadata => metadata.map_err(io_error("look at", &path))?,
+    };
+    let mode = metadata.permissions().mode() & 0o777;
+    if mode & 0o177 != 0 {
+        return Err(StateError::TokenMode { path, mode });
+    }
+    let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
+    text.parse().map_err(|_| StateError::Nonsense {
+        path,
+        expected: "a token of 64 hexadecimal digits",
+    })
+}
+
+/// Writes a small file so that it holds the old bytes or the new ones, whatever happens.
+fn replace(path: &Path, bytes: &[u8], mode: u32) -> Result<(), StateError> {
+    let fresh = path.with_extension("new");
+    let write = || {
+        remove_if_there(fs::remove_file(&fresh))?;
+        let mut file = OpenOptions::new()
+            .create_new(true)
+            .write(true)
+            .mode(mode)
+            .open(&fresh)?;
+        file.write_all(bytes)?;
+        file.sync_all()?;
+        fs::rename(&fresh, path)?;
+        match path.parent() {
+            Some(folder) => File::open(folder)?.sync_all(),
+            None => Ok(()),
+        }
+    };
+    write().map_err(io_error("write", path))
+}
+
+/// Makes a folder that only its owner may enter, and those above it.
+pub(crate) fn make_folder(path: &Path) -> Result<(), StateError> {
+    fs::DirBuilder::new()
+        .recursive(true)
+        .mode(0o700)
+        .create(path)
+        .map_err(io_error("make the folder", path))
+}
+
+/// Removes a file or a folder with what it holds, if it is there.
+pub(crate) fn remove_all(path: &Path) -> Result<(), StateError> {
+    let removed = if path.is_dir() {
+        fs::remove_dir_all(path)
+    } else {
+        fs::remove_file(path)
+    };
+    remove_if_there(removed).map_err(io_error("remove", path))
+}
+
+fn remove_if_there(result: io::Result<()>) -> io::Result<()> {
+    match result {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(()),
+        result => result,
+    }
+}
+
+fn io_error(attempted: &'static str, path: &Path) -> impl FnOnce(io::Error) -> StateError {
+    let path = path.to_owned();
+    move |source| StateError::Io {
+        attempted,
+        path,
+        source,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_start_counts_and_keeps_the_token() {
+        let folder = tempfile::tempdir().unwrap();
+        let root = folder.path().join("deep/state");
+        let first = State::take(&root).unwrap();
+        let token = first.token().reveal().to_owned();
+        assert_eq!(first.epoch(), Epoch(1));
+        assert!(matches!(State::take(&root), Err(StateError::Locked(_))));
+        drop(first);
+        let second = State::take(&root).unwrap();
+        assert_eq!(second.epoch(), Epoch(2));
+        assert_eq!(second.token().reveal(), token);
+        let mode = fs::metadata(root.join("token"))
+            .unwrap()
+            .permissions()
+            .mode();
+        assert_eq!(mode & 0o777, 0o600);
+    }
+
+    #[test]
+    fn a_token_that_others_can_read_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        drop(State::take(folder.path()).unwrap());
+        let token = folder.path().join("token");
+        fs::set_permissions(&token, fs::Permissions::from_mode(0o640)).unwrap();
+        let refused = State::take(folder.path()).unwrap_err();
+        assert!(refused.to_string().contains("mode 640"), "{refused}");
+    }
+
+    #[test]
+    fn scratch_goes_and_frames_stay() {
+        let folder = tempfile::tempdir().unwrap();
+        let state = State::take(folder.path()).unwrap();
+        let (done, begun) = (state.job(JobId(1)), state.job(JobId(2)));
+        for job in [&done, &begun] {
+            job.make().unwrap();
+            fs::write(job.scratch.join("0"), "x").unwrap();
+        }
+        fs::write(done.frames.join("a_0000.exr"), "x").unwrap();
+        fs::write(done.frames.join(".a_0001.exr.part"), "x").unwrap();
+        drop(state);
+        drop(State::take(folder.path()).unwrap());
+        assert!(done.frames.join("a_0000.exr").exists());
+        assert!(!done.frames.join(".a_0001.exr.part").exists());
+        assert!(!done.scratch.exists() && !begun.root.exists());
+    }
+
+    #[test]
+    fn an_epoch_that_is_no_number_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("epoch"), "many").unwrap();
+        let refused = State::take(folder.path()).unwrap_err().to_string();
+        assert!(refused.contains("does not hold a number"), "{refused}");
+    }
+}
