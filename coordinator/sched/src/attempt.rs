@@ -24,7 +24,7 @@ pub(crate) struct Attempt {
     pub(crate) delivered: u32,
     /// One bit per block of the tile, row by row: arrived under this attempt.
     arrived: Vec<u64>,
-    /// How long it may take over one block.
+    /// How long it may take over the next block.
     pub(crate) limit: Span,
     /// When it counts as stuck; set while it is [`Phase::Running`].
     pub(crate) stuck: Option<Timestamp>,

@@ -74,12 +74,10 @@ impl Sched {
             .workers
             .get_mut(&id)
             .expect("a worker in the market is known");
-        if worker.live.is_empty() {
-            worker.patience = Span(0);
-        }
+
         worker.live.insert(number);
         worker.idle += 1;
-        worker.patience = worker.patience.max(limit);
+        worker.patience = limit;
         if worker.waiting.is_none() {
             self.rearm_waiting(id);
         }

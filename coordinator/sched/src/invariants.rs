@@ -114,7 +114,7 @@ impl Sched {
             let running = |number: &&u64| self.attempts[*number].phase == Phase::Running;
             let idle = worker.live.len() - worker.live.iter().filter(running).count();
             assert_eq!(idle, worker.idle as usize);
-            assert_eq!(worker.waiting.is_some(), idle > 0);
+            assert_eq!(worker.waiting.is_some(), worker.is_idle());
             assert_eq!(worker.load, worker.wants());
             assert!(
                 worker

@@ -3,7 +3,7 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use model::{AttemptId, Revision, Running, WorkerId};
+use model::{AttemptId, Revision, Running, Span, WorkerId};
 
 use crate::attempt::Phase;
 use crate::timers::Timer;
@@ -120,20 +120,32 @@ impl Sched {
 
     /// A live attempt has begun, or has rendered or delivered a block.
     pub(crate) fn progress(&mut self, number: u64) {
-        let Some(attempt) = self.attempts.get_mut(&number) else {
+        let Some(limit) = self.block_limit(number) else {
             return;
         };
+        let attempt = self.attempts.get_mut(&number).expect("it has a limit");
         let id = attempt.worker;
         let (before, after) = (attempt.phase, attempt.phase_now());
         attempt.phase = after;
-        let due = (after == Phase::Running).then(|| self.now + attempt.limit);
+        attempt.limit = limit;
+        let due = (after == Phase::Running).then(|| self.now + limit);
         self.timers
             .set(Timer::Stuck(number), &mut attempt.stuck, due);
         if let Some(worker) = self.workers.get_mut(&id) {
             worker.idle += u32::from(after != Phase::Running);
             worker.idle -= u32::from(before != Phase::Running);
+            worker.patience = limit;
         }
         self.rearm_waiting(id);
+    }
+
+    /// How long a live attempt may take over its next block.
+    fn block_limit(&self, number: u64) -> Option<Span> {
+        let attempt = self.attempts.get(&number)?;
+        let job = self.jobs.get(&attempt.image.job)?;
+        let work = job.work.get(&job.place(attempt.image.image)?)?;
+        let failures = work.tiles[attempt.tile as usize].failures;
+        Some(job.block_limit(&self.config, failures))
     }
 
     pub(crate) fn given_back(&mut self, id: WorkerId, attempts: &[AttemptId]) {
@@ -238,10 +250,11 @@ impl Sched {
         }
     }
 
-    /// Something of a worker moved: what is idle may wait for its patience again.
+    /// Something of a worker moved: where it renders nothing, what it holds may wait
+    /// for its patience again. While it renders, the limit of that holds.
     pub(crate) fn rearm_waiting(&mut self, id: WorkerId) {
         if let Some(worker) = self.workers.get_mut(&id) {
-            let due = (worker.idle > 0).then(|| self.now + worker.patience);
+            let due = worker.is_idle().then(|| self.now + worker.patience);
             self.timers
                 .set(Timer::Waiting(id), &mut worker.waiting, due);
         }

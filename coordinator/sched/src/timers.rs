@@ -10,7 +10,7 @@ use model::{Timestamp, WorkerId};
 pub(crate) enum Timer {
     /// An attempt that runs has rendered no block for too long.
     Stuck(u64),
-    /// A worker holds attempts that wait to be started or delivered, and nothing of its has moved for too long.
+    /// A worker renders nothing of what it holds, and has delivered nothing, for too long.
     Waiting(WorkerId),
     /// A worker was not heard of for too long.
     Lost(WorkerId),

@@ -19,7 +19,7 @@ pub(crate) struct Worker {
     pub(crate) live: BTreeSet<u64>,
     /// How many of them wait for something else of its: those not started, those being delivered.
     pub(crate) idle: u32,
-    /// The longest block limit among the attempts since it last held none.
+    /// The newest limit for one block of what it holds.
     pub(crate) patience: Span,
     pub(crate) joined: Timestamp,
     pub(crate) heard: Timestamp,
@@ -28,7 +28,7 @@ pub(crate) struct Worker {
     pub(crate) render_time: Span,
     /// When it counts as lost.
     pub(crate) lost: Option<Timestamp>,
-    /// When what is idle counts as forgotten; set while something is.
+    /// When what it holds counts as forgotten; set while it holds something and renders nothing.
     pub(crate) waiting: Option<Timestamp>,
     /// Where it stands in the market; `None` while it wants no tile.
     pub(crate) load: Option<Load>,
@@ -54,6 +54,11 @@ impl Worker {
             waiting: None,
             load: None,
         }
+    }
+
+    /// Whether it holds something and renders nothing.
+    pub(crate) fn is_idle(&self) -> bool {
+        self.idle > 0 && self.idle as usize == self.live.len()
     }
 
     /// Where it belongs in the market.

@@ -31,7 +31,7 @@ impl Backoff {
         let doubled = self.first.times(1 << failures.min(40));
         let step = doubled.min(self.longest).0;
         let random = split_mix(self.key ^ (u64::from(failures) << 32)) >> 32;
-        let scaled = u128::from(step.div_ceil(2)) * u128::from(random) >> 32;
+        let scaled = (u128::from(step.div_ceil(2)) * u128::from(random)) >> 32;
         Span(step / 2 + u64::try_from(scaled).unwrap_or(u64::MAX))
     }
 }

@@ -1,10 +1,5 @@
 //! What a worker does, situation by situation: exact effects, and nothing else.
 
-#![expect(
-    clippy::wildcard_imports,
-    reason = "the situation's words are the language of these tests"
-)]
-
 mod situation;
 
 use model::{Epoch, Running, Span};
