@@ -1,0 +1,87 @@
+//! A full disk: the sentence says so, nothing half-written is taken for a frame, and with
+//! space again the work goes on.
+
+use crate::harness::scenes::{FLYBY, SMALL, film_digests, rendered};
+use crate::harness::{Farm, Job, Place, need, wait};
+
+/// Mounts a tmpfs of `$1` on `$2`, then becomes the rest of its words.
+const ON_SMALL_DISK: &str =
+    "mount -t tmpfs -o size=\"$1\" flyby-test \"$2\" && shift 2 && exec \"$@\"";
+
+const IMAGE: [&str; 2] = ["--frames", "0"];
+
+#[test]
+fn render_says_so_and_goes_on_when_there_is_space() {
+    let Some(mounting) = need::mounting() else {
+        return;
+    };
+    let place = Place::new();
+    let out = place.path("out");
+    std::fs::create_dir(&out).unwrap();
+    std::fs::create_dir(place.path("kept")).unwrap();
+    // What lies on the small disk is gone with the command, so all of it is one script.
+    let script = format!(
+        "\"$@\" && echo no failure
+         echo first: $?
+         ls -A {out} | grep -v '^[.]' | grep 'exr$' && echo a frame on a full disk
+         mount -o remount,size=64m {out}
+         \"$@\" && echo again: $?
+         cp {out}/*.exr {kept}",
+        out = out.display(),
+        kept = place.path("kept").display()
+    );
+    let wrapper = [
+        mounting,
+        &[
+            "sh",
+            "-c",
+            ON_SMALL_DISK,
+            "sh",
+            "600k",
+            out.to_str().unwrap(),
+        ],
+        &["sh", "-c", &script, "sh"],
+    ]
+    .concat();
+    let arguments = [&["render", FLYBY, "--out", "out"], &SMALL[..], &IMAGE].concat();
+    let outcome = place.run(place.wrapped(&wrapper, arguments), wait::LIMIT);
+    assert!(outcome.stdout.contains("first: 1\n"), "{outcome}");
+    assert!(
+        !outcome.stdout.contains("a frame on a full disk"),
+        "{outcome}"
+    );
+    assert!(outcome.stdout.contains("again: 0\n"), "{outcome}");
+    assert!(outcome.stderr.contains("no space left"), "{outcome}");
+    let reference = rendered(&place, "reference", &[&SMALL[..], &IMAGE].concat());
+    assert_eq!(film_digests(&place, "kept"), reference);
+}
+
+#[test]
+fn a_coordinator_fails_that_image_with_the_reason_and_takes_the_next_job() {
+    let Some(mounting) = need::mounting() else {
+        return;
+    };
+    let place = Place::new();
+    let jobs = place.state().join("jobs");
+    std::fs::create_dir_all(&jobs).unwrap();
+    let disk = [
+        "sh",
+        "-c",
+        ON_SMALL_DISK,
+        "sh",
+        "600k",
+        jobs.to_str().unwrap(),
+    ];
+    let mut farm = Farm::wrapped(place, &[mounting, &disk].concat(), &[]);
+    farm.worker(&["--threads", "1"]);
+
+    let job = farm.submit(&[&[FLYBY], &SMALL[..], &IMAGE].concat());
+    let failed = farm.wait_until(job, "the job is over", Job::is_over);
+    assert_eq!(failed.state(), "failed", "{failed:?}");
+    let reason = failed.images()[0]["error"].as_str().unwrap();
+    assert!(reason.contains("no space left"), "{reason}");
+
+    let next =
+        farm.submit(&[&[FLYBY, "--resolution", "40x30", "--rays", "1"], &IMAGE[..]].concat());
+    farm.wait_done(next);
+}

@@ -1,0 +1,26 @@
+//! The farm as a user meets it: the program just built, as real processes on this machine.
+//!
+//! One module for each behaviour that a user could name. The slow ones are ignored unless
+//! `tests/run --all` asks for them.
+
+#![allow(
+    clippy::unwrap_used,
+    reason = "a test ends where something is not as it must be"
+)]
+
+#[path = "../harness/mod.rs"]
+mod harness;
+
+mod bad_places;
+mod bad_scenes;
+mod bad_words;
+mod cancel;
+mod demo;
+mod failures;
+mod full_disk;
+mod hostile_messages;
+mod readers;
+mod readme;
+mod resume;
+mod same_pixels;
+mod stopping;

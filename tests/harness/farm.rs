@@ -1,0 +1,151 @@
+//! A coordinator, its workers and its jobs.
+
+use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::time::Duration;
+
+use serde_json::Value;
+
+use super::{Job, Outcome, Place, Process, wait};
+
+/// A farm of real processes on loopback. Dropping it kills them all.
+pub(crate) struct Farm {
+    /// Its workers, in the order in which they were started.
+    pub(crate) workers: Vec<Process>,
+    /// Its coordinator.
+    pub(crate) coordinator: Process,
+    /// Where the coordinator listens.
+    pub(crate) address: SocketAddr,
+    /// Where everything lies.
+    pub(crate) place: Place,
+}
+
+impl Farm {
+    /// A coordinator with these further options, that answers already, and no worker yet.
+    pub(crate) fn new(options: &[&str]) -> Self {
+        Self::wrapped(Place::new(), &[], options)
+    }
+
+    /// [`Farm::new`] in a place that a test has prepared, its coordinator started by another
+    /// program that is given `wrapper`'s further words.
+    pub(crate) fn wrapped(place: Place, wrapper: &[&str], options: &[&str]) -> Self {
+        let command = [
+            "coordinator",
+            "--while-input-open",
+            "--listen",
+            "127.0.0.1:0",
+        ];
+        let arguments = command.iter().chain(options);
+        let command = place.wrapped(wrapper, arguments);
+        let mut coordinator = place.start_command("coordinator", command);
+        let file = place.state().join("coordinator.json");
+        let address = wait::until("the coordinator says where it listens", || {
+            let ended = coordinator.ended();
+            assert!(ended.is_none(), "the coordinator ended with {ended:?}");
+            let said: Value = serde_json::from_slice(&std::fs::read(&file).ok()?).unwrap();
+            Some(said["address"].as_str().unwrap().parse().unwrap())
+        });
+        Self {
+            workers: Vec::new(),
+            coordinator,
+            address,
+            place,
+        }
+    }
+
+    /// A farm of `count` workers of one thread each.
+    pub(crate) fn of_workers(count: usize) -> Self {
+        let mut farm = Self::new(&[]);
+        for _ in 0..count {
+            farm.worker(&["--threads", "1"]);
+        }
+        farm
+    }
+
+    /// Starts a worker with these further options; answers its place in [`Farm::workers`].
+    pub(crate) fn worker(&mut self, options: &[&str]) -> usize {
+        self.worker_through(self.address, options)
+    }
+
+    /// Starts a worker that dials another address than the coordinator's own.
+    pub(crate) fn worker_through(&mut self, address: SocketAddr, options: &[&str]) -> usize {
+        let address = address.to_string();
+        let command = ["worker", "--while-input-open", "--coordinator", &address];
+        let name = format!("worker{}", self.workers.len());
+        let worker = self.place.start(&name, command.iter().chain(options));
+        self.workers.push(worker);
+        self.workers.len() - 1
+    }
+
+    /// Runs a command that speaks with this coordinator.
+    #[track_caller]
+    pub(crate) fn flyby<'a>(&self, arguments: impl IntoIterator<Item = &'a str>) -> Outcome {
+        self.place.flyby(arguments)
+    }
+
+    /// Submits a job; answers its number.
+    #[track_caller]
+    pub(crate) fn submit(&self, arguments: &[&str]) -> u64 {
+        let command = ["submit", "--output", "json"];
+        let answer = self
+            .flyby(command.into_iter().chain(arguments.iter().copied()))
+            .json();
+        answer["job"]
+            .as_u64()
+            .unwrap_or_else(|| panic!("no job in {answer}"))
+    }
+
+    /// A job as it is now.
+    #[track_caller]
+    pub(crate) fn job(&self, job: u64) -> Job {
+        Job(self
+            .flyby(["job", "show", &job.to_string(), "--output", "json"])
+            .json())
+    }
+
+    /// Waits until a job is as `condition` wants it; answers it as it then is.
+    #[track_caller]
+    pub(crate) fn wait_until(&self, job: u64, what: &str, condition: impl Fn(&Job) -> bool) -> Job {
+        wait::until(what, || Some(self.job(job)).filter(&condition))
+    }
+
+    /// Waits until at least `blocks` blocks of a job are acknowledged.
+    #[track_caller]
+    pub(crate) fn wait_acknowledged(&self, job: u64, blocks: u64) -> Job {
+        let what = format!("{blocks} blocks are acknowledged");
+        self.wait_until(job, &what, |job| job.number("blocks_done") >= blocks)
+    }
+
+    /// Waits for a job's end, which must be that all its images are done.
+    #[track_caller]
+    pub(crate) fn wait_done(&self, job: u64) -> Job {
+        self.wait_done_within(wait::LIMIT, job)
+    }
+
+    /// [`Farm::wait_done`] with another limit.
+    #[track_caller]
+    pub(crate) fn wait_done_within(&self, limit: Duration, job: u64) -> Job {
+        let over = || Some(self.job(job)).filter(Job::is_over);
+        let job = wait::until_within(limit, "the job is over", over);
+        assert_eq!(job.state(), "done", "{job:?}");
+        job
+    }
+
+    /// Waits until the coordinator counts `count` workers as connected.
+    #[track_caller]
+    pub(crate) fn wait_connected(&self, count: usize) {
+        wait::until(&format!("{count} workers are connected"), || {
+            let list = self.flyby(["worker", "list", "--output", "json"]).json();
+            let workers = list["workers"].as_array().unwrap();
+            let connected = workers
+                .iter()
+                .filter(|worker| worker["state"] == "connected");
+            (connected.count() == count).then_some(())
+        });
+    }
+}
+
+/// An address of loopback on which nobody listens.
+pub(crate) fn free_address() -> SocketAddr {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    listener.local_addr().unwrap()
+}
