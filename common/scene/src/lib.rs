@@ -3,12 +3,17 @@
 //! A scene file becomes a [`Description`] once, where it is submitted. Everyone
 //! else only ever sees the description.
 
+mod bound;
 mod bytes;
 mod camera;
 mod canonical;
 pub mod curve;
 pub mod description;
+mod expression;
+mod file;
+mod ground;
 pub mod rules;
+mod show;
 mod spline;
 mod sun;
 mod vector;
@@ -17,3 +22,6 @@ pub use bytes::{BYTES_MAX, NotAScene, NotWritable, digest_of};
 pub use camera::{Flight, Pose};
 pub use curve::Curve;
 pub use description::Description;
+pub use file::{
+    FILE_BYTES_MAX, Loaded, Mistake, Overrides, Place, SceneError, Source, load, parse,
+};

@@ -68,6 +68,14 @@ pub fn problems(scene: &Description) -> Vec<Problem> {
     found.0
 }
 
+/// What a named curve, whose values may be anything finite, breaks.
+pub(crate) fn named_curve(name: &str, curve: &Curve) -> Option<Problem> {
+    let mut found = Problems::default();
+    let wanted = Wanted::number(-1e15, 1e15, "a curve's value");
+    found.curve(&format!("curves.{name}"), curve, wanted);
+    found.0.into_iter().next()
+}
+
 #[derive(Default)]
 struct Problems(Vec<Problem>);
 
