@@ -1,0 +1,71 @@
+//! What a worker is started with, and why one does not start.
+
+use std::io;
+use std::net::SocketAddr;
+use std::num::NonZeroU32;
+use std::path::PathBuf;
+
+use wire::auth::Token;
+
+/// What a worker is started with. None of it changes a pixel.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// Where the coordinator listens.
+    pub coordinator: SocketAddr,
+    /// The coordinator's token.
+    pub token: Token,
+    /// What the worker calls itself, 1 to 200 bytes.
+    pub name: String,
+    /// Render threads; each renders one tile at a time.
+    pub threads: NonZeroU32,
+    /// Tiles held beyond those; `None`: as many as threads.
+    pub ahead: Option<u32>,
+    /// Where its id and the assets it fetched are kept; `None`: nowhere.
+    pub state: Option<PathBuf>,
+    /// This program's version, shown to users.
+    pub build: String,
+    /// The memory of this machine in bytes; 0 is not known.
+    pub memory_bytes: u64,
+}
+
+impl Config {
+    /// A worker of so many threads, with the usual settings.
+    pub fn new(
+        coordinator: SocketAddr,
+        token: Token,
+        name: impl Into<String>,
+        threads: NonZeroU32,
+    ) -> Self {
+        Self {
+            coordinator,
+            token,
+            name: name.into(),
+            threads,
+            ahead: None,
+            state: None,
+            build: String::new(),
+            memory_bytes: 0,
+        }
+    }
+}
+
+/// Why a worker could not run.
+#[derive(Debug, thiserror::Error)]
+pub enum RunError {
+    /// Its state folder cannot be used.
+    #[error("cannot {attempted} {}", path.display())]
+    State {
+        /// What was attempted, as it stands after "cannot".
+        attempted: &'static str,
+        /// On which path.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The system has no random numbers.
+    #[error("the system gives no random numbers: {0}")]
+    Random(String),
+    /// The system refused a thread.
+    #[error("cannot start a render thread")]
+    Thread(#[source] io::Error),
+}
