@@ -19,6 +19,13 @@ pub const RANGE: f64 = 1.037;
 /// centre. The thesis's 2.75 (§5.2.3) is not one.
 pub const SLOPE: f64 = 3.75;
 
+/// No value is farther from the exact one at its f32 offset.
+///
+/// With u = 2⁻²⁴: a kernel's product is good to 3u, the fade to 3u (every f32 in [0, 1] was tried),
+/// and the three interpolations of differences up to 4, 3 and 2 add 9, 7 and 5 times that and their own
+/// roundings: 45u in all. Seen over 10⁸ places: 3.6 · 10⁻⁷.
+pub const ROUNDING: f64 = 2.7e-6;
+
 /// A lattice's name: the hash's state after its key.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct Lattice(u32);

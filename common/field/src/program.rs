@@ -1,11 +1,14 @@
 //! Compiled fields: a graph flattened for evaluation over batches of points.
 
+mod bounds;
 mod code;
 mod fold;
 mod machine;
 mod plan;
 mod slopes;
 
+#[cfg(test)]
+mod bound_tests;
 #[cfg(test)]
 pub(crate) mod tests;
 
@@ -17,6 +20,8 @@ use crate::points::{Points, Scratch};
 use crate::simd::SimdLevel;
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
+pub(crate) use bounds::Change;
+use bounds::Pass;
 use code::{Code, Operation};
 pub(crate) use machine::Machine;
 use plan::Plan;
@@ -143,14 +148,24 @@ impl Program {
 
     /// The values that each root can take, rounding included; may be infinite.
     pub fn range(&self, around: &Surroundings) -> Vec<Interval> {
-        let _ = around;
-        Vec::new()
+        let bounds = Pass::new(around, 0.0).run(&self.plan);
+        self.plan
+            .roots
+            .iter()
+            .map(|&root| bounds[root].range())
+            .collect()
     }
 
     /// How far the first root's value can move with the place.
     pub fn modulus(&self, around: &Surroundings) -> Modulus {
-        let _ = around;
-        Modulus::default()
+        let Some(&root) = self.plan.roots.first() else {
+            return Modulus::default();
+        };
+        Modulus::of_levels(|radius| {
+            let mut pass = Pass::new(around, radius);
+            let bounds = pass.run(&self.plan);
+            (bounds[root].change(), pass.crossings)
+        })
     }
 
     /// How many noises one evaluation of all roots needs at a place of that footprint.

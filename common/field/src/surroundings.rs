@@ -2,10 +2,15 @@
 
 use crate::interval::Interval;
 
-/// A region of space, in world metres.
+/// Bounds hold for places whose coordinates, and distance from the origin, are at most this: metres.
+///
+/// Beyond it positions lose their micrometres, and no bound that includes rounding is of use.
+pub const WORLD: f64 = 1e8;
+
+/// A region of space, in world metres; only its part within [`WORLD`] counts.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Region {
-    /// All space.
+    /// All of the world.
     All,
     /// inner ≤ ‖p‖ ≤ outer: a spherical shell about the origin.
     Shell {

@@ -1,0 +1,251 @@
+//! Ranges and moduli against what evaluation gives: no pair of places may break any level.
+
+use crate::hash::{hash, unit};
+use crate::program::tests::{fig_5_6, planet, scaled, values, zoo};
+use crate::{Graph, Interval, NodeId, Op, Points, Program, Region, SimdLevel, Surroundings};
+
+/// Pairs of places in a region: near and far, with the footprints of a camera at `eye`.
+struct Pairs {
+    columns: [[Vec<f64>; 5]; 2],
+    around: Surroundings,
+}
+
+const PIXEL_ANGLE: f64 = 2e-3;
+
+fn inside(region: Region, p: [f64; 3]) -> bool {
+    let length = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+    match region {
+        Region::All => true,
+        Region::Shell { inner, outer } => (inner..=outer).contains(&length),
+        Region::Slab { low, high } => (low..=high).contains(&p[2]),
+        Region::Box { min, max } => (0..3).all(|i| (min[i]..=max[i]).contains(&p[i])),
+    }
+}
+
+impl Pairs {
+    /// `place` draws a place of the region from three numbers in [−1, 1].
+    fn new(
+        region: Region,
+        eye: [f64; 3],
+        reach: f64,
+        pairs: u32,
+        place: impl Fn([f64; 3]) -> [f64; 3],
+    ) -> Self {
+        let mut columns: [[Vec<f64>; 5]; 2] = Default::default();
+        let mut footprints = Interval::point(0.0);
+        for i in 0..pairs {
+            let number = |k: u32| 2.0 * unit(hash(&[99, i, k])) - 1.0;
+            let p = place([number(0), number(1), number(2)]);
+            let distance = reach * libm::exp2(-15.0 + 15.0 * number(3));
+            let q = [0, 1, 2].map(|k| p[k] + distance * number(4 + k as u32));
+            let q = if inside(region, q) {
+                q
+            } else {
+                place([number(7), number(8), number(9)])
+            };
+            let t = number(10).abs();
+            for (place, columns) in [p, q].into_iter().zip(&mut columns) {
+                assert!(inside(region, place), "{place:?}");
+                let away = [0, 1, 2].map(|k| place[k] - eye[k]);
+                let footprint = PIXEL_ANGLE
+                    * (away[0] * away[0] + away[1] * away[1] + away[2] * away[2]).sqrt();
+                let row = [place[0], place[1], place[2], footprint, t];
+                for (column, value) in columns.iter_mut().zip(row) {
+                    column.push(value);
+                }
+                footprints = if i == 0 {
+                    Interval::point(footprint)
+                } else {
+                    footprints.hull(Interval::point(footprint))
+                };
+            }
+        }
+        let around = Surroundings {
+            region,
+            footprint: footprints,
+            time: Interval::new(0.0, 1.0),
+            footprint_slope: PIXEL_ANGLE,
+        };
+        Self { columns, around }
+    }
+
+    fn points(&self, end: usize) -> Points<'_> {
+        let [x, y, z, footprint, time] = self.columns[end].each_ref().map(Vec::as_slice);
+        Points {
+            x,
+            y,
+            z,
+            footprint,
+            time,
+        }
+    }
+
+    /// Checks every pair against the range and against every level; gives the least slack seen at the first.
+    fn check(&self, name: &str, program: &Program) -> f64 {
+        let level = SimdLevel::best();
+        let (f, g) = (
+            values(program, level, &self.points(0)),
+            values(program, level, &self.points(1)),
+        );
+        let range = program.range(&self.around)[0];
+        let modulus = program.modulus(&self.around);
+        assert!(modulus.levels.len() <= crate::modulus::LEVELS_MAX);
+        for pair in modulus.levels.windows(2) {
+            assert!(
+                pair[0].offset < pair[1].offset && pair[0].slope > pair[1].slope,
+                "{name}: {modulus:?}"
+            );
+        }
+        let mut steepest = 0.0f64;
+        for i in 0..f.len() {
+            let part = |k: usize| self.columns[0][k][i] - self.columns[1][k][i];
+            let distance = (part(0) * part(0) + part(1) * part(1) + part(2) * part(2)).sqrt();
+            let change = (f[i] - g[i]).abs();
+            assert!(
+                range.contains(f[i]) && range.contains(g[i]),
+                "{name}: {} {} outside {range:?}",
+                f[i],
+                g[i]
+            );
+            for level in &modulus.levels {
+                let most = level.offset + level.slope * distance;
+                assert!(
+                    change <= most,
+                    "{name}: {change} over {distance} is above {level:?}"
+                );
+            }
+            steepest = steepest.max(
+                (change - modulus.levels.first().map_or(0.0, |level| level.offset)) / distance,
+            );
+        }
+        steepest / modulus.lipschitz()
+    }
+}
+
+fn program(build: impl Fn(&mut Graph) -> NodeId) -> Program {
+    let mut graph = Graph::new();
+    let root = build(&mut graph);
+    Program::compile(&graph, &[root], Interval::new(0.0, 1.0)).unwrap()
+}
+
+#[test]
+fn no_pair_in_a_box_breaks_a_bound() {
+    let region = Region::Box {
+        min: [-3.0, -2.0, 0.25],
+        max: [3.0, 1.0, 2.5],
+    };
+    let pairs = Pairs::new(region, [0.5, 0.5, 6.0], 3.0, 20_000, |[x, y, z]| {
+        [3.0 * x, 1.5 * y - 0.5, 1.375 + 1.125 * z]
+    });
+    for (name, program) in zoo() {
+        pairs.check(&name, &program);
+    }
+}
+
+#[test]
+fn no_pair_in_a_shell_breaks_a_bound() {
+    let region = Region::Shell {
+        inner: 0.5,
+        outer: 2.0,
+    };
+    let pairs = Pairs::new(region, [1.2, 0.0, 0.3], 2.0, 20_000, |[x, y, z]| {
+        let length = (x * x + y * y + z * z).sqrt().max(1e-9);
+        let radius = 0.5001 + 1.4998 * (x * 1e3).rem_euclid(1.0);
+        [x, y, z].map(|part| part / length * radius)
+    });
+    for (name, program) in zoo() {
+        pairs.check(&name, &program);
+    }
+}
+
+#[test]
+fn no_pair_on_a_planet_breaks_a_bound() {
+    const R: f64 = 6_371_000.0;
+    let region = Region::Shell {
+        inner: R - 20.0,
+        outer: R + 50.0,
+    };
+    let eye = [R + 25.0, 0.0, 0.0];
+    let pairs = Pairs::new(region, eye, 30.0, 100_000, |[x, y, z]| {
+        let p = [R, 2e3 * y * y * y, 2e3 * z * z * z];
+        let length = (p[0] * p[0] + p[1] * p[1] + p[2] * p[2]).sqrt();
+        p.map(|part| part / length * (R + 15.0 + 34.0 * x))
+    });
+    for cell in [1000.0, 30.0, 3.0] {
+        let program = program(|g| planet(g, cell));
+        let share = pairs.check(&format!("planet of cells of {cell} m"), &program);
+        assert!(
+            share > 0.02,
+            "the bound is {} times what was seen",
+            1.0 / share
+        );
+        let rounding = program.modulus(&pairs.around).levels[0].offset;
+        assert!(rounding < 1e-3, "rounding moves the ground by {rounding} m");
+    }
+}
+
+#[test]
+fn the_bound_of_the_spheres_is_the_derived_one() {
+    // 1 + 0.3·4·3.75 + 0.15·8·3.75 + 0.05·16·3.75 = 13: thesis eq. (5.12) with the constant that is one.
+    let program = program(fig_5_6);
+    let around = Surroundings {
+        region: Region::Shell {
+            inner: 0.3,
+            outer: 1.7,
+        },
+        footprint: Interval::new(0.0, 1.0),
+        time: Interval::point(0.0),
+        footprint_slope: 1e-3,
+    };
+    let modulus = program.modulus(&around);
+    assert!((modulus.lipschitz() - 13.0).abs() < 1e-6);
+    assert!(modulus.levels[0].offset < 1e-5);
+    // Far away only the distance itself counts as slope: the noises are at most 1.037.
+    let far = modulus.levels[modulus.levels.len() - 2];
+    assert!(
+        (far.slope - 1.0).abs() < 1e-6 && (far.offset - 2.0 * 0.5 * 1.037).abs() < 1e-5,
+        "{far:?}"
+    );
+    assert!(modulus.levels.len() >= 4);
+    let range = program.range(&around)[0];
+    assert!(
+        range.low > -1.219 && range.low < -1.218 && range.high > 1.218 && range.high < 1.219,
+        "{range:?}"
+    );
+}
+
+#[test]
+fn scaled_noise_knows_no_diagonal() {
+    let program = program(|g| {
+        let p = scaled(g, 4.0);
+        g.push(Op::Noise, &[p], &[1.0]).unwrap()
+    });
+    let around = Surroundings {
+        region: Region::Slab {
+            low: -1.0,
+            high: 1.0,
+        },
+        footprint: Interval::point(0.0),
+        time: Interval::point(0.0),
+        footprint_slope: 0.0,
+    };
+    assert!((program.modulus(&around).lipschitz() - 15.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_field_without_a_bound_says_so() {
+    let program = program(|g| {
+        let p = g.push(Op::Position, &[], &[]).unwrap();
+        let x = g.push(Op::X, &[p], &[]).unwrap();
+        let one = g.constant(1.0).unwrap();
+        g.push(Op::Div, &[one, x], &[]).unwrap()
+    });
+    let around = Surroundings {
+        region: Region::All,
+        footprint: Interval::point(0.0),
+        time: Interval::point(0.0),
+        footprint_slope: 0.0,
+    };
+    assert_eq!(program.range(&around), [Interval::ALL]);
+    assert_eq!(program.modulus(&around).clear_radius(1e9), 0.0);
+}
