@@ -21,6 +21,9 @@ mod sky;
 mod trace;
 mod view;
 
+#[cfg(test)]
+mod tests;
+
 pub use assets::Assets;
 pub use counts::Counts;
 pub use error::{Cancelled, RenderError};

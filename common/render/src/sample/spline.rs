@@ -174,7 +174,7 @@ mod tests {
             assert!((cubic.distribution(x).1 - density).abs() < 1e-14);
         }
         // The first piece of its distribution is x⁴/24.
-        let y = 1e-3;
+        let y: f64 = 1e-3;
         let x = (24.0 * y).sqrt().sqrt() - 2.0;
         assert!((cubic.inverse(y) - x).abs() < 1e-12);
     }

@@ -1,0 +1,174 @@
+//! The search finds what a scan over every point of the grid finds, and nothing else.
+
+use core::sync::atomic::AtomicBool;
+
+use field::hash::{hash, unit};
+use field::{Points, Scratch, SimdLevel};
+use glam::DVec3;
+
+use super::scenes;
+use crate::Counts;
+use crate::sample::Sample;
+use crate::trace::{Goal, Hit, Ray, Surface, Tracer, bound};
+use crate::view::View;
+
+/// Few pixels, so that the grid is coarse enough to be scanned.
+fn coarse(mut scene: scene::Description) -> scene::Description {
+    scene.film.resolution.width = 40;
+    scene.film.window = scene.film.resolution.rect();
+    scene
+}
+
+/// Values of the field at every point of a ray's grid, until the first inside.
+fn scan(surface: &Surface, ray: &Ray) -> Hit {
+    let Some((start, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
+        return Hit::None;
+    };
+    let (first, last) = (ray.grid.first_from(start), ray.grid.first_from(end));
+    let value = |index: i64| {
+        let t = ray.grid.place(index);
+        let place = ray.origin + ray.direction * t;
+        let distance = {
+            let square = ray.from_eye.dot(ray.from_eye);
+            (square + t * (2.0 * ray.from_eye.dot(ray.direction) + t)).sqrt()
+        };
+        let mut value = [0.0];
+        surface.program.evaluate(
+            SimdLevel::scalar(),
+            &Points {
+                x: &[place.x],
+                y: &[place.y],
+                z: &[place.z],
+                footprint: &[surface.footprint.at(distance)],
+                time: &[ray.time],
+            },
+            &mut Scratch::new(),
+            &mut [&mut value],
+        );
+        (value[0], bound::contains(&surface.bound, place))
+    };
+    for index in first..=last {
+        let (inside, within) = value(index);
+        if inside > 0.0 || !within {
+            continue;
+        }
+        let far = ray.grid.place(index);
+        if index == 0 {
+            return Hit::Surface(far);
+        }
+        let near = ray.grid.place(index - 1);
+        let (outside, within) = value(index - 1);
+        return if within {
+            Hit::Surface(near + (far - near) * (outside / (outside - inside)))
+        } else {
+            Hit::Face(far)
+        };
+    }
+    Hit::None
+}
+
+fn rays(surface: &Surface, view: &View, count: u32) -> Vec<Ray> {
+    let random = |ray: u32, dimension: u32| unit(hash(&[ray, dimension, 99]));
+    (0..count)
+        .map(|index| {
+            let sight = view.sight(&Sample {
+                place: [
+                    40.0 * random(index, 0),
+                    40.0 * random(index, 1),
+                ],
+                instant: random(index, 2),
+            });
+            Ray {
+                origin: sight.origin,
+                direction: sight.direction,
+                from_eye: DVec3::ZERO,
+                time: sight.time,
+                grid: surface.sight,
+                clear: 0.0,
+            }
+        })
+        .collect()
+}
+
+fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
+    let mut hits = Vec::new();
+    let mut counts = Counts::default();
+    Tracer::default()
+        .trace(
+            surface,
+            goal,
+            rays,
+            &mut Scratch::new(),
+            &AtomicBool::new(false),
+            &mut counts,
+            &mut hits,
+        )
+        .unwrap();
+    (hits, counts)
+}
+
+#[test]
+fn the_search_finds_what_a_scan_finds() {
+    for (name, scene) in scenes::all() {
+        let scene = coarse(scene);
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let rays = rays(&surface, &view, 60);
+        let (hits, counts) = trace(&surface, Goal::Distance, &rays);
+        for (ray, hit) in rays.iter().zip(&hits) {
+            assert_eq!(*hit, scan(&surface, ray), "{name}: {ray:?}");
+        }
+        assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
+        let per_ray = counts.steps / 60;
+        assert!(per_ray < 400, "{name} took {per_ray} steps a ray: nothing is proven");
+    }
+}
+
+#[test]
+fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
+    for (name, scene) in [("ridges", scenes::ridges()), ("cube", scenes::cube())] {
+        let scene = coarse(scene);
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let sights = rays(&surface, &view, 80);
+        let (hits, _) = trace(&surface, Goal::Distance, &sights);
+        let sun = DVec3::from(scene.sun.direction(0.0));
+        let shadows: Vec<Ray> = sights
+            .iter()
+            .zip(&hits)
+            .filter_map(|(ray, hit)| {
+                let distance = hit.distance()?;
+                let from_eye = ray.direction * distance + sun * 0.01;
+                Some(Ray {
+                    origin: ray.origin + from_eye,
+                    direction: sun,
+                    from_eye,
+                    grid: surface.shadow_grid(distance),
+                    ..*ray
+                })
+            })
+            .collect();
+        let (shaded, _) = trace(&surface, Goal::Occlusion, &shadows);
+        for (ray, hit) in shadows.iter().zip(&shaded) {
+            assert_eq!(*hit != Hit::None, scan(&surface, ray) != Hit::None, "{name}");
+        }
+        assert!(shaded.iter().any(|hit| *hit != Hit::None));
+        assert!(shaded.contains(&Hit::None));
+    }
+}
+
+#[test]
+fn where_the_search_starts_cannot_be_seen() {
+    let scene = scenes::hypertexture();
+    let view = View::new(&scene.camera, &scene.film, 0.0);
+    let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+    let mut rays = rays(&surface, &view, 200);
+    let (hits, _) = trace(&surface, Goal::Distance, &rays);
+    for share in [0.3, 0.9, 0.999_9] {
+        for (ray, hit) in rays.iter_mut().zip(&hits) {
+            ray.clear = hit.distance().unwrap_or(5.0) * share;
+        }
+        // Just short of the hit's own grid point the search may begin anywhere.
+        assert_eq!(trace(&surface, Goal::Distance, &rays).0, hits);
+    }
+}

@@ -1,0 +1,7 @@
+//! Tests of whole images and of what they promise.
+
+mod analytic;
+mod golden;
+mod guarantee;
+mod same;
+mod scenes;

@@ -1,0 +1,144 @@
+//! A pixel depends on scene, image and place alone.
+
+use core::sync::atomic::AtomicBool;
+
+use model::{ImageNumber, Rect};
+
+use super::scenes::{self, block, image, renderer};
+use crate::{Assets, Cancelled, EvalSettings, ImageRenderer, RenderError, SimdLevel};
+
+#[test]
+fn every_level_gives_the_same_bytes_and_counts() {
+    for (name, scene) in scenes::all() {
+        let reference = image(
+            &scene,
+            EvalSettings {
+                level: SimdLevel::scalar(),
+            },
+        );
+        for level in SimdLevel::all_available() {
+            assert!(
+                image(&scene, EvalSettings { level }) == reference,
+                "{name} differs at level {level}"
+            );
+        }
+    }
+}
+
+#[test]
+fn any_rectangle_holds_the_pixels_of_the_whole_and_counts_add_up() {
+    for (name, scene) in scenes::all() {
+        let renderer = renderer(&scene, EvalSettings::default());
+        let whole = scene.film.resolution.rect();
+        let (reference, counts) = block(&renderer, whole);
+        for side in [7, 13, 32] {
+            let mut total = crate::Counts::default();
+            let mut pixels = vec![f32::NAN; reference.len()];
+            for y0 in (0..whole.y1).step_by(side) {
+                for x0 in (0..whole.x1).step_by(side) {
+                    let step = u32::try_from(side).unwrap();
+                    let rect = Rect {
+                        x0,
+                        y0,
+                        x1: (x0 + step).min(whole.x1),
+                        y1: (y0 + step).min(whole.y1),
+                    };
+                    let (part, counts) = block(&renderer, rect);
+                    total += counts;
+                    paste(&part, rect, &mut pixels, whole);
+                }
+            }
+            let equal = pixels
+                .iter()
+                .zip(&reference)
+                .all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(equal, "{name} differs when cut into squares of {side}");
+            assert_eq!(total, counts, "{name}, squares of {side}");
+        }
+    }
+}
+
+fn paste(part: &[f32], rect: Rect, pixels: &mut [f32], whole: Rect) {
+    let (width, height) = (rect.width() as usize, rect.height() as usize);
+    let full = whole.area() as usize;
+    for (index, value) in part.iter().enumerate() {
+        let (plane, rest) = (index / (width * height), index % (width * height));
+        let (x, y) = (rect.x0 as usize + rest % width, rect.y0 as usize + rest / width);
+        pixels[plane * full + y * whole.width() as usize + x] = *value;
+    }
+}
+
+#[test]
+fn images_differ_and_nothing_is_lost_on_the_way() {
+    let scene = scenes::planet();
+    let (pixels, counts) = image(&scene, EvalSettings::default());
+    assert!(pixels.iter().all(|value| value.is_finite()));
+    assert_eq!(counts.samples, scene.film.resolution.rect().area() * 4);
+    assert_eq!(counts.rays, counts.samples);
+    assert!(counts.hits > 0 && counts.hits < counts.rays && counts.shadow_rays <= counts.hits);
+    assert_eq!((counts.not_finite, counts.exhausted), (0, 0));
+    let other = ImageRenderer::new(
+        &scene,
+        &Assets::new(),
+        ImageNumber(2),
+        EvalSettings::default(),
+    )
+    .unwrap();
+    assert!(block(&other, scene.film.resolution.rect()).0 != pixels);
+}
+
+#[test]
+fn a_cancelled_block_says_so() {
+    let scene = scenes::hypertexture();
+    let renderer = renderer(&scene, EvalSettings::default());
+    let mut pixels = Vec::new();
+    let rect = scene.film.resolution.rect();
+    assert_eq!(
+        renderer.render_block(rect, &AtomicBool::new(true), &mut pixels),
+        Err(Cancelled)
+    );
+}
+
+#[test]
+fn what_cannot_be_rendered_is_refused_in_words() {
+    let refuse = |change: fn(&mut scene::Description), image: u32| {
+        let mut scene = scenes::plane();
+        change(&mut scene);
+        let settings = EvalSettings::default();
+        match ImageRenderer::new(&scene, &Assets::new(), ImageNumber(image), settings) {
+            Ok(_) => panic!("this was to be refused"),
+            Err(error) => error,
+        }
+    };
+    let late = refuse(|_| {}, 3);
+    assert!(late.to_string().contains("3 images"), "{late}");
+    let none = refuse(|scene| scene.sampling.rays = 0, 0);
+    assert!(matches!(none, RenderError::Rays { rays: 0 }));
+    let centre = refuse(|scene| scene.sampling.filter_order = 0, 0);
+    assert!(matches!(centre, RenderError::CentreAlone { rays: 2 }));
+    let missing = refuse(
+        |scene| {
+            scene.assets.push(scene::description::AssetRef {
+                name: "sand.png".to_owned(),
+                digest: model::Digest([5; 32]),
+                bytes: 10,
+            });
+            scene.surface.material.layers.push(scene::description::Layer {
+                albedo: [1.0; 3],
+                above: None,
+                below: None,
+                steeper: None,
+                gentler: None,
+                cover: None,
+                height_offset: None,
+                ramp: Some(scene::description::Ramp {
+                    asset: 0,
+                    low: 0.0,
+                    high: 1.0,
+                }),
+            });
+        },
+        0,
+    );
+    assert!(missing.to_string().contains("sand.png"), "{missing}");
+}
