@@ -192,3 +192,23 @@ impl std::fmt::Display for Corners {
         write!(f, "({x0}, {y0})..({x1}, {y1})")
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_full_disk_is_told_apart_from_other_errors() {
+        let error = |code| {
+            let source = io::Error::from_raw_os_error(code);
+            ImageError::io("write a block to", Path::new("/frames/s"), source)
+        };
+        // ENOSPC and EDQUOT on one side, EIO on the other.
+        assert!(error(28).is_disk_full() && error(122).is_disk_full());
+        assert!(!error(5).is_disk_full());
+        assert_eq!(
+            error(28).to_string(),
+            "no space left to write a block to /frames/s: free some and run again"
+        );
+    }
+}

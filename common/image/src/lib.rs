@@ -10,7 +10,7 @@
 //!
 //! It never learns what a scene, a tile or an attempt is. All input and output blocks; memory is
 //! bounded by a strip of 32 rows while writing and by [`DECODED_BYTES_MAX`] while reading.
-//! The test `tests/whole_way.rs` shows it whole.
+//! The tests in `tests/whole_way` show it whole.
 
 mod compare;
 mod digest;

@@ -68,8 +68,9 @@ fn shoulder(rgb: [f64; 3]) -> [f64; 3] {
     let room = 1.0 - SHOULDER;
     let compressed = 1.0 - room * room / (peak + room - SHOULDER);
     let white = 1.0 - 1.0 / (DESATURATION * (peak - compressed) + 1.0);
+    let factor = compressed / peak;
     rgb.map(|value| {
-        let scaled = value / peak * compressed;
+        let scaled = value * factor;
         scaled + (compressed - scaled) * white
     })
 }
@@ -95,7 +96,6 @@ impl Quantiser {
         let mut code = 0;
         let first = (0..=steps)
             .map(|step| {
-                #[expect(clippy::cast_precision_loss, reason = "at most 2^18")]
                 let light = step as f64 / steps as f64;
                 while code < top && thresholds[usize::from(code)] <= light {
                     code += 1;
@@ -110,8 +110,6 @@ impl Quantiser {
         let steps = self.first.len() - 1;
         #[expect(
             clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            clippy::cast_precision_loss,
             reason = "light is from 0 to 1 up to rounding, and the result is limited"
         )]
         let step = ((light * steps as f64) as usize).min(steps);

@@ -16,6 +16,7 @@ use exr::meta::attribute::{
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
 use half::f16;
+use half::slice::HalfFloatSliceExt;
 use model::film::{CHANNEL_COUNT, CHANNELS, Storage};
 use model::rect::GRID_SQUARE;
 use model::{Digest, Rect};
@@ -25,7 +26,7 @@ use super::publish::Pending;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
-use crate::scratch::Strip;
+use crate::scratch::{Strip, append_le_bytes};
 
 // The `exr` crate takes samples in the machine's order of bytes, the digest little-endian ones;
 // the same lines serve both.
@@ -115,11 +116,12 @@ fn write_tiles(
 /// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
 fn encode(strip: &Strip, channels: &[usize; CHANNEL_COUNT]) -> Vec<Vec<u8>> {
     let line = |y: u32, channel: usize| {
-        let row = strip.row(channel, y);
+        let (row, mut bytes) = (strip.row(channel, y), Vec::new());
         match CHANNELS[channel].storage {
-            Storage::Half => row.iter().flat_map(|v| to_half(*v).to_le_bytes()).collect(),
-            Storage::Float => row.iter().flat_map(|v| v.to_le_bytes()).collect(),
+            Storage::Half => append_half_bytes(row, &mut bytes),
+            Storage::Float => append_le_bytes(row, &mut bytes),
         }
+        bytes
     };
     strip
         .rows()
@@ -127,9 +129,19 @@ fn encode(strip: &Strip, channels: &[usize; CHANNEL_COUNT]) -> Vec<Vec<u8>> {
         .collect()
 }
 
-/// The nearest half, the largest finite one for what lies beyond.
-fn to_half(value: f32) -> f16 {
-    f16::from_f32(value.clamp(-HALF_MAX, HALF_MAX))
+/// Appends the nearest halves, little-endian; the largest finite one for what lies beyond.
+fn append_half_bytes(samples: &[f32], out: &mut Vec<u8>) {
+    let limited: Vec<f32> = samples
+        .iter()
+        .map(|value| value.clamp(-HALF_MAX, HALF_MAX))
+        .collect();
+    let mut halves = vec![f16::ZERO; samples.len()];
+    halves.convert_from_f32_slice(&limited);
+    let from = out.len();
+    out.resize(from + halves.len() * 2, 0);
+    for (bytes, half) in out[from..].chunks_exact_mut(2).zip(halves) {
+        bytes.copy_from_slice(&half.to_le_bytes());
+    }
 }
 
 /// The film's channels in the order of the file, which is that of their names.
@@ -210,9 +222,17 @@ mod tests {
 
     #[test]
     fn light_beyond_a_half_is_never_infinite() {
-        assert_eq!(to_half(1e30), f16::MAX);
-        assert_eq!(to_half(-1e30), f16::MIN);
-        assert_eq!(to_half(65_519.0), f16::MAX);
-        assert_eq!(to_half(0.18).to_f32(), 0.180_053_71);
+        for (value, stored) in [
+            (1e30, f16::MAX),
+            (-1e30, f16::MIN),
+            (65_519.0, f16::MAX),
+            (0.18, f16::from_f32_const(0.18)),
+            // Halfway between two halves: the even one.
+            (2049.0, f16::from_f32_const(2048.0)),
+        ] {
+            let mut bytes = Vec::new();
+            append_half_bytes(&[value; 9], &mut bytes);
+            assert_eq!(bytes, stored.to_le_bytes().repeat(9));
+        }
     }
 }

@@ -71,7 +71,7 @@ impl FrameMetadata {
     /// Images per second as a fraction: whole, NTSC's (n·1000/1001), else in thousandths.
     pub(crate) fn rate(&self) -> Option<(i32, u32)> {
         let rate = self.frames_per_second;
-        if !(rate >= 0.001 && rate <= 1e6) {
+        if !(0.001..=1e6).contains(&rate) {
             return None;
         }
         [(1.0, 1), (1.001, 1001), (1000.0, 1000)]

@@ -4,7 +4,7 @@
 use std::io::{BufWriter, Write};
 
 use model::{Digest, Rect};
-use png::{BitDepth, ColorType, Encoder, EncodingError, SrgbRenderingIntent};
+use png::{BitDepth, ColorType, Compression, Encoder, EncodingError, SrgbRenderingIntent};
 
 use super::Source;
 use super::publish::Pending;
@@ -91,6 +91,7 @@ fn describe<W: Write>(
         Depth::Eight => BitDepth::Eight,
         Depth::Sixteen => BitDepth::Sixteen,
     });
+    encoder.set_compression(Compression::Fast);
     encoder.set_source_srgb(SrgbRenderingIntent::Perceptual);
     let metadata = &source.request.metadata;
     for (name, text) in metadata.texts(source.film_digest) {
@@ -134,16 +135,14 @@ pub(super) fn hash_head(hasher: &mut StoredHasher, window: Rect, depth: Depth) {
 
 /// Takes a row of interleaved R, G, B into the digest of stored values.
 pub(super) fn hash_row(hasher: &mut StoredHasher, row: &[u8], depth: Depth) {
-    let bytes = match depth {
-        Depth::Eight => 1,
-        Depth::Sixteen => 2,
-    };
     for channel in [2, 1, 0] {
-        let samples: Vec<u8> = row
-            .chunks_exact(3 * bytes)
-            .flat_map(|pixel| pixel[channel * bytes..(channel + 1) * bytes].iter().rev())
-            .copied()
-            .collect();
+        let samples: Vec<u8> = match depth {
+            Depth::Eight => row.iter().skip(channel).step_by(3).copied().collect(),
+            Depth::Sixteen => row
+                .chunks_exact(6)
+                .flat_map(|pixel| [pixel[2 * channel + 1], pixel[2 * channel]])
+                .collect(),
+        };
         hasher.samples(&samples);
     }
 }

@@ -4,6 +4,7 @@ use model::film::{CHANNEL_COUNT, CHANNELS};
 use model::{Digest, Rect};
 
 use super::Scratch;
+use super::strip::append_le_bytes;
 use crate::error::ImageError;
 
 /// Rises when what the digest is taken over changes.
@@ -36,8 +37,7 @@ impl Scratch {
             for y in strip.rows() {
                 bytes.clear();
                 for channel in 0..CHANNEL_COUNT {
-                    let row = strip.row(channel, y);
-                    bytes.extend(row.iter().flat_map(|value| value.to_le_bytes()));
+                    append_le_bytes(strip.row(channel, y), &mut bytes);
                 }
                 hasher.update(&bytes);
             }

@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{BufReader, ErrorKind, Read, Seek, SeekFrom};
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use model::{Digest, Rect};
 
@@ -29,7 +30,7 @@ pub(super) struct Entry {
 /// The journal of one scratch file, open for adding.
 #[derive(Debug)]
 pub(super) struct Journal {
-    file: File,
+    file: Arc<File>,
     path: PathBuf,
     /// Binds every record to its scratch file's header.
     binding: Digest,
@@ -45,7 +46,7 @@ impl Journal {
             .and_then(|()| file.write_all_at(&head(binding), 0))
             .map_err(|source| ImageError::io("begin the journal", &path, source))?;
         Ok(Self {
-            file,
+            file: Arc::new(file),
             path,
             binding,
             end: RECORD_BYTES as u64,
@@ -79,7 +80,7 @@ impl Journal {
         file.set_len(end)
             .map_err(|source| ImageError::io("cut the journal", &path, source))?;
         Ok(Some(Self {
-            file,
+            file: Arc::new(file),
             path,
             binding,
             end,
@@ -95,11 +96,9 @@ impl Journal {
         Ok(())
     }
 
-    /// Makes all records durable.
-    pub(super) fn sync(&self) -> Result<(), ImageError> {
-        self.file
-            .sync_data()
-            .map_err(|source| ImageError::io("sync the journal", &self.path, source))
+    /// The file, to be synced while others go on adding.
+    pub(super) fn file(&self) -> Arc<File> {
+        Arc::clone(&self.file)
     }
 
     /// Where it is.

@@ -16,6 +16,7 @@ mod strip;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use model::film::CHANNELS;
@@ -28,7 +29,7 @@ use self::journal::{Entry, Journal};
 use crate::error::ImageError;
 
 pub use self::header::ScratchIdentity;
-pub(crate) use self::strip::Strip;
+pub(crate) use self::strip::{Strip, append_le_bytes};
 
 /// Locks over the slots, so that blocks of one square do not undo each other.
 const SLOT_LOCKS: usize = 16;
@@ -60,6 +61,8 @@ pub struct Scratch {
     grid: Grid,
     slots: [Mutex<()>; SLOT_LOCKS],
     state: Mutex<State>,
+    /// Whether the folder was synced since the files were opened.
+    named: AtomicBool,
 }
 
 #[derive(Debug)]
@@ -181,6 +184,7 @@ impl Scratch {
                 coverage: Coverage::new(grid),
                 journal,
             }),
+            named: AtomicBool::new(false),
         }
     }
 
@@ -248,13 +252,19 @@ impl Scratch {
         self.file.write_all_at(&slot, offset)
     }
 
-    /// Makes every block written so far durable: pixels, journal, and the files' names.
+    /// Makes every block written so far durable: pixels, journal, and the files' names. Blocks may
+    /// be written meanwhile.
     pub fn sync(&self) -> Result<(), ImageError> {
+        let journal = self.state().journal.file();
         self.file
             .sync_data()
+            .and_then(|()| journal.sync_data())
             .map_err(|source| ImageError::io("sync", &self.path, source))?;
-        self.state().journal.sync()?;
-        crate::frame::publish::sync_folder_of(&self.path)
+        if !self.named.load(Ordering::Relaxed) {
+            crate::frame::publish::sync_folder_of(&self.path)?;
+            self.named.store(true, Ordering::Relaxed);
+        }
+        Ok(())
     }
 
     /// What is not done: whole blocks of the window, or the missing parts of those begun.
@@ -376,6 +386,3 @@ fn not_finite(block: Rect, index: usize, value: f32) -> ImageError {
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
-
-#[cfg(test)]
-mod tests;

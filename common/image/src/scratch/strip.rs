@@ -98,3 +98,12 @@ impl Scratch {
         Ok(())
     }
 }
+
+/// Appends samples, little-endian.
+pub(crate) fn append_le_bytes(samples: &[f32], out: &mut Vec<u8>) {
+    let from = out.len();
+    out.resize(from + samples.len() * 4, 0);
+    for (bytes, sample) in out[from..].chunks_exact_mut(4).zip(samples) {
+        bytes.copy_from_slice(&sample.to_le_bytes());
+    }
+}
