@@ -143,7 +143,7 @@ impl History {
                 pixels.extend(pixels_of(rect));
             }
             Effect::Encode { image } => {
-                let view = self.sched.job(image.job).unwrap();
+                let view = self.sched.job(image.job).expect("it is known");
                 let durable = self.durable[&image].len() as u64;
                 assert_eq!(durable, view.window.area(), "every pixel is there");
                 assert!(self.begun_encoding.insert(image), "encoded once");
@@ -161,7 +161,10 @@ impl History {
         let view = self.sched.worker(worker).expect("it is known");
         assert!(view.attempts <= view.credit, "credit is kept");
         assert_eq!(
-            self.sched.job(lease.image.job).unwrap().revision,
+            self.sched
+                .job(lease.image.job)
+                .expect("it is known")
+                .revision,
             view.revision
         );
         let durable = self.durable.entry(lease.image).or_default();
@@ -175,7 +178,7 @@ impl History {
     fn check(&self) {
         let mut live: BTreeMap<(ImageRef, Rect), usize> = BTreeMap::new();
         for (&attempt, (worker, lease)) in &self.leases {
-            let rect = lease.tile.blocks().next().unwrap();
+            let rect = lease.tile.blocks().next().expect("a tile has a block");
             let image = lease.image;
             let verdict = self.sched.accepts(
                 *worker,
@@ -371,7 +374,7 @@ impl History {
                 image,
                 film: film(1),
             });
-            let view = self.sched.image(image).unwrap();
+            let view = self.sched.image(image).expect("it is known");
             assert_eq!(view.state, ImageState::Encoded { film: film(1) });
         }
     }

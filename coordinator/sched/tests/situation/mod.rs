@@ -190,7 +190,7 @@ pub(crate) fn submission(id: u128, images: u32) -> Submission {
         name: "flyby".into(),
         scene: Digest([7; 32]),
         revision: REVISION,
-        frames: format!("0..{images}").parse().unwrap(),
+        frames: format!("0..{images}").parse().expect("a range"),
         window: Resolution {
             width: 64,
             height: 64,
@@ -215,7 +215,10 @@ pub(crate) fn tile(index: u32) -> Rect {
 
 /// One of the four blocks of an image, counted row by row.
 pub(crate) fn block(index: u32) -> Rect {
-    tile(index / 2).blocks().nth(index as usize % 2).unwrap()
+    tile(index / 2)
+        .blocks()
+        .nth(index as usize % 2)
+        .expect("two blocks a tile")
 }
 
 pub(crate) fn worker(id: u64) -> WorkerId {
@@ -237,7 +240,7 @@ pub(crate) fn image_ref(image: u32) -> ImageRef {
 }
 
 pub(crate) fn film(image: u32) -> Digest {
-    Digest([u8::try_from(image).unwrap(); 32])
+    Digest([u8::try_from(image).expect("a small number"); 32])
 }
 
 pub(crate) fn block_ref(number: u64, image: u32, rect: Rect) -> BlockRef {
