@@ -138,21 +138,18 @@ pub(crate) fn film_digest(path: &Path) -> Option<Digest> {
     digest.parse().ok()
 }
 
-/// What the names of a scene's files begin with: letters, digits, `-`, `_` and `.` of its name.
+/// What the names of a scene's files begin with: the letters, digits, `-` and `_` of its
+/// name, as on the farm.
 pub(crate) fn stem(name: &str) -> String {
     let kept: String = name
         .chars()
-        .map(|letter| match letter {
-            'a'..='z' | 'A'..='Z' | '0'..='9' | '-' | '_' | '.' => letter,
-            _ => '_',
-        })
+        .filter(|letter| letter.is_ascii_alphanumeric() || matches!(letter, '-' | '_'))
         .take(100)
         .collect();
-    let kept = kept.trim_start_matches('.');
     if kept.is_empty() {
-        "frames".to_owned()
+        "frame".to_owned()
     } else {
-        kept.to_owned()
+        kept
     }
 }
 
@@ -239,9 +236,8 @@ mod tests {
     #[test]
     fn stems_are_plain_file_names() {
         assert_eq!(stem("flyby"), "flyby");
-        assert_eq!(stem("Höhen flug/2"), "H_hen_flug_2");
-        assert_eq!(stem("../x"), "_x");
-        assert_eq!(stem(""), "frames");
-        assert_eq!(stem("..."), "frames");
+        assert_eq!(stem("Höhen flug/2"), "Hhenflug2");
+        assert_eq!(stem("../x"), "x");
+        assert_eq!(stem("..."), "frame");
     }
 }

@@ -5,14 +5,17 @@
 //! the environment. Each command stands in a file of its own under `commands/`.
 
 mod commands;
+mod daemon;
 mod error;
 mod existing;
-mod link;
+mod farm;
+mod load;
 mod movie;
 mod options;
 mod output;
 mod places;
 mod progress;
+mod render;
 mod stop;
 mod twins;
 mod values;

@@ -37,8 +37,8 @@ pub(crate) struct SceneOptions {
     pub(crate) crop: Option<Rect>,
 
     /// Sets a value of the scene file, such as `sun.elevation="20 deg"`; may be repeated.
-    #[arg(long, value_name = "KEY=VALUE", value_parser = values::setting, help_heading = "What to render")]
-    pub(crate) set: Vec<(String, String)>,
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "What to render")]
+    pub(crate) set: Vec<String>,
 }
 
 /// Which frames.

@@ -62,9 +62,9 @@ impl Progress {
         self.bar.set_message(format!("{about}{left}"));
     }
 
-    /// Changes what there is to do in all.
-    pub(crate) fn set_total(&self, total: u64) {
-        self.bar.set_length(total);
+    /// Says that so many steps were done before it started, which is sometimes known late.
+    pub(crate) fn set_before(&mut self, before: u64) {
+        self.before = before;
     }
 
     /// How many units a second were done since the start, of `units` done since then.

@@ -1,7 +1,7 @@
-//! How users write sizes, rectangles and settings on the command line.
+//! How users write sizes, rectangles and lengths of time on the command line.
 
 use model::rect::SIDE_MAX;
-use model::{Rect, Resolution};
+use model::{Rect, Resolution, Span};
 
 /// Two whole numbers from 1 to the longest side of an image, as in `400x300`.
 pub(crate) fn resolution(text: &str) -> Result<Resolution, String> {
@@ -57,13 +57,32 @@ pub(crate) fn crop(text: &str) -> Result<Rect, String> {
     }
 }
 
-/// A setting of a scene, `key=value`; the key is a path such as `camera.path.altitude`.
-pub(crate) fn setting(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
-        Some((key, value)) if !key.trim().is_empty() => {
-            Ok((key.trim().to_owned(), value.trim().to_owned()))
-        }
-        _ => Err(format!("`{text}` is no setting: write it as key=value")),
+/// A length of time: `1500 ms`, `4 s`, `2 min`.
+pub(crate) fn span(text: &str) -> Result<Span, String> {
+    let form = || format!("`{text}` is no length of time: write it as 1500 ms, 4 s or 2 min");
+    let text = text.trim();
+    let digits = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+    let milliseconds = match &text[digits.len()..] {
+        "ms" => 1,
+        "s" => 1_000,
+        "min" => 60_000,
+        _ => return Err(form()),
+    };
+    let number: u64 = digits.trim().parse().map_err(|_| form())?;
+    match number.checked_mul(milliseconds) {
+        // A year is more than anything here may take, and far from any overflow.
+        Some(total @ 1..=31_536_000_000) => Ok(Span::from_millis(total)),
+        _ => Err(format!("`{text}` is out of range: 1 ms to a year is possible")),
+    }
+}
+
+/// A number of things of which there is at least one.
+pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
+    match text.trim().parse() {
+        Ok(0) => Err("there must be at least 1".to_owned()),
+        Ok(number @ 1..=4_096) => Ok(number),
+        Ok(_) => Err("at most 4096 are possible".to_owned()),
+        Err(_) => Err(format!("`{text}` is no whole number")),
     }
 }
 
@@ -95,10 +114,19 @@ mod tests {
     }
 
     #[test]
-    fn settings() {
-        let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
-        assert_eq!(setting("a.b=3 m"), pair("a.b", "3 m"));
-        assert_eq!(setting("f=x == 1"), pair("f", "x == 1"));
-        assert!(setting("a").is_err() && setting("=3").is_err());
+    fn lengths_of_time() {
+        assert_eq!(span("1500 ms"), Ok(Span::from_millis(1_500)));
+        assert_eq!(span("4s"), Ok(Span::from_secs(4)));
+        assert_eq!(span("2 min"), Ok(Span::from_secs(120)));
+        for wrong in ["", "4", "s", "-4 s", "4 h", "0 s", "99999999999999 min", "4.5 s"] {
+            assert!(span(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_things() {
+        assert_eq!(at_least_one("2"), Ok(2));
+        assert!(at_least_one("0").is_err() && at_least_one("4097").is_err());
+        assert!(at_least_one("-1").is_err() && at_least_one("two").is_err());
     }
 }

@@ -1,7 +1,13 @@
 //! The commands: what each is called, and which file runs it.
 
 mod completions;
+mod coordinator;
 mod image;
+mod job;
+mod render;
+mod scene;
+mod submit;
+mod worker;
 
 use std::path::PathBuf;
 
@@ -42,6 +48,20 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Renders frames here, in this process; interrupted, it goes on where it was.
+    Render(render::Render),
+    /// Runs a coordinator until it is told to stop.
+    Coordinator(coordinator::Coordinator),
+    /// Runs a worker until it is told to stop; with a verb, manages workers.
+    Worker(worker::WorkerCommand),
+    /// Submits a job to the coordinator.
+    Submit(submit::Submit),
+    /// Your jobs: list, show, watch, log, cancel, fetch.
+    #[command(subcommand)]
+    Job(job::JobCommand),
+    /// Scene files: mistakes, contents, schema.
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
     /// What frames hold: digests, metadata, differences.
     #[command(subcommand)]
     Image(image::ImageCommand),
@@ -58,6 +78,12 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         state: cli.state.or(state),
     };
     match cli.command {
+        Command::Render(options) => render::run(&context, &options),
+        Command::Coordinator(options) => coordinator::run(&context, &options),
+        Command::Worker(command) => worker::run(&context, command),
+        Command::Submit(options) => submit::run(&context, &options),
+        Command::Job(command) => job::run(&context, command),
+        Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),
         Command::Completions(options) => completions::completions(&options, Cli::command()),
         Command::Man(options) => completions::man(&options, Cli::command()),

@@ -64,11 +64,11 @@ pub(crate) struct Done {
 }
 
 /// What happened.
-pub(crate) enum News<'a> {
+pub(crate) enum News {
     /// An image was begun, and its scratch file held something.
     Found(ImageNumber, Opened),
-    /// An image is finished.
-    Frame(ImageNumber, &'a FinishedFrame),
+    /// A frame is finished.
+    Frame,
     /// Some blocks are done.
     Progress,
 }
@@ -80,6 +80,12 @@ pub(crate) struct Outcome {
     pub(crate) frames: Vec<(ImageNumber, FinishedFrame)>,
     /// Work done in this run.
     pub(crate) counts: Counts,
+    /// Blocks rendered in this run.
+    pub(crate) blocks: u64,
+    /// Whole blocks found in scratch files.
+    pub(crate) blocks_found: u64,
+    /// Pixels found in scratch files.
+    pub(crate) pixels_found: u64,
     /// How long it took.
     pub(crate) wall: Duration,
 }
@@ -105,6 +111,8 @@ struct Shared<'a> {
     halt: AtomicBool,
     pixels: AtomicU64,
     pixels_found: AtomicU64,
+    blocks: AtomicU64,
+    blocks_found: AtomicU64,
     rays: AtomicU64,
 }
 
@@ -115,7 +123,7 @@ struct Shared<'a> {
 pub(crate) fn render(
     plan: &Plan<'_>,
     stop: &Stop,
-    mut tell: impl FnMut(Done, News<'_>),
+    mut tell: impl FnMut(Done, News),
 ) -> Result<Outcome, Error> {
     let started = Instant::now();
     let shared = Shared {
@@ -124,11 +132,16 @@ pub(crate) fn render(
         halt: AtomicBool::new(false),
         pixels: AtomicU64::new(0),
         pixels_found: AtomicU64::new(0),
+        blocks: AtomicU64::new(0),
+        blocks_found: AtomicU64::new(0),
         rays: AtomicU64::new(0),
     };
     let mut outcome = Outcome {
         frames: Vec::new(),
         counts: Counts::default(),
+        blocks: 0,
+        blocks_found: 0,
+        pixels_found: 0,
         wall: Duration::ZERO,
     };
     let mut failure = None;
@@ -154,6 +167,9 @@ pub(crate) fn render(
     }
     outcome.frames.sort_by_key(|(image, _)| *image);
     outcome.wall = started.elapsed();
+    outcome.pixels_found = shared.pixels_found.into_inner();
+    outcome.blocks = shared.blocks.into_inner();
+    outcome.blocks_found = shared.blocks_found.into_inner();
     Ok(outcome)
 }
 
@@ -164,7 +180,7 @@ fn listen(
     stop: &Stop,
     outcome: &mut Outcome,
     failure: &mut Option<Error>,
-    tell: &mut impl FnMut(Done, News<'_>),
+    tell: &mut impl FnMut(Done, News),
 ) {
     loop {
         if stop.is_set() {
@@ -175,7 +191,7 @@ fn listen(
             Err(RecvTimeoutError::Disconnected) => return,
             Ok(Event::Found(image, opened)) => tell(shared.done(), News::Found(image, opened)),
             Ok(Event::Finished(image, frame, counts)) => {
-                tell(shared.done(), News::Frame(image, &frame));
+                tell(shared.done(), News::Frame);
                 outcome.counts += counts;
                 outcome.frames.push((image, frame));
             }
@@ -251,7 +267,10 @@ impl Shared<'_> {
             // Whoever listens ends only after this thread.
             let _ = events.send(Event::Found(image, opened));
         }
-        let blocks = in_tiles(scratch.remaining(), film.window, plan.tile);
+        let remaining = scratch.remaining();
+        let squares = film.window.blocks().count().saturating_sub(remaining.len());
+        self.blocks_found.fetch_add(squares as u64, Ordering::Relaxed);
+        let blocks = in_tiles(remaining, film.window, plan.tile);
         let work = Work {
             image,
             renderer,
@@ -274,6 +293,7 @@ impl Shared<'_> {
             Error::failed(format!("cannot keep a part of frame {}", work.image)).because(error)
         })?;
         self.pixels.fetch_add(block.area(), Ordering::Relaxed);
+        self.blocks.fetch_add(1, Ordering::Relaxed);
         self.rays.fetch_add(counts.rays, Ordering::Relaxed);
         *work.counts.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += counts;
         Ok(())

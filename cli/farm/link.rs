@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use wire::Failure;
+use wire::auth::Token;
 use wire::failure::Retry;
 use wire::link::Farm;
 use wire::place;
@@ -41,11 +42,15 @@ impl Context {
         }
     }
 
+    /// The coordinator's token, from the state folder.
+    pub(crate) fn token(&self) -> Result<Token, Error> {
+        place::token(&self.state()?).map_err(not_found)
+    }
+
     /// Opens a connection to the coordinator.
     pub(crate) async fn connect(&self, options: &FarmOptions) -> Result<Farm, Error> {
         let address = self.address(options)?;
-        let token = place::token(&self.state()?).map_err(not_found)?;
-        wire::link::farm(address, token).await.map_err(|error| {
+        wire::link::farm(address, self.token()?).await.map_err(|error| {
             Error::unreachable(format!("no coordinator answers at {address}"))
                 .because(error)
                 .next("start one with `flyby coordinator`, or say where it is with `--coordinator`")

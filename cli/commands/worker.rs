@@ -1,0 +1,211 @@
+//! `flyby worker`: runs a worker until it is told to stop; with a verb, manages workers.
+
+use std::fs::{self, File};
+use std::num::NonZeroU32;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use agent::{Ask, ExitReason, RenderPainter, RunError};
+use clap::{Args, Subcommand};
+use render::SimdLevel;
+use tokio::sync::mpsc;
+use wire::proto::ListWorkersRequest;
+
+use super::render::processors;
+use crate::daemon::{self, DaemonOptions};
+use crate::error::{Ending, Error};
+use crate::farm::link::{block_on, refused};
+use crate::farm::view::{self, Workers};
+use crate::options::{Context, FarmOptions};
+use crate::output;
+use crate::stop::Stop;
+use crate::values;
+
+#[derive(Args, Debug)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub(crate) struct WorkerCommand {
+    #[command(subcommand)]
+    verb: Option<Verb>,
+
+    #[command(flatten)]
+    worker: Worker,
+}
+
+#[derive(Subcommand, Debug)]
+enum Verb {
+    /// Lists the workers that the coordinator knows.
+    List(List),
+}
+
+#[derive(Args, Debug)]
+struct List {
+    #[command(flatten)]
+    farm: FarmOptions,
+}
+
+#[derive(Args, Debug)]
+struct Worker {
+    #[command(flatten)]
+    farm: FarmOptions,
+
+    /// Render threads [default: one for each processor].
+    #[arg(long, value_name = "N", value_parser = values::at_least_one)]
+    threads: Option<usize>,
+
+    /// Tiles to hold beyond those that are rendered [default: one for each thread].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=4096))]
+    ahead: Option<u32>,
+
+    /// What it calls itself; one with a name keeps its number and the files of scenes in the
+    /// state folder [default: the machine's name and the process].
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+
+    /// Instruction set; pixels do not depend on it [default: the best of this machine].
+    #[arg(long, value_name = "LEVEL")]
+    simd: Option<SimdLevel>,
+
+    #[command(flatten)]
+    daemon: DaemonOptions,
+}
+
+/// Runs the command.
+pub(crate) fn run(context: &Context, command: WorkerCommand) -> Result<Ending, Error> {
+    match command.verb {
+        None => work(context, &command.worker),
+        Some(Verb::List(options)) => block_on(list(context, &options.farm)),
+    }
+}
+
+async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error> {
+    let mut farm = context.connect(options).await?;
+    let answer = farm
+        .list_workers(ListWorkersRequest {})
+        .await
+        .map_err(|status| refused("cannot list the workers", status))?;
+    let workers = answer.into_inner().workers.into_iter();
+    let workers = workers.map(view::Worker::from).collect();
+    output::print(context.output, &Workers { workers })?;
+    Ok(Ending::Done)
+}
+
+fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
+    let coordinator = context.address(&options.farm)?;
+    let token = context.token()?;
+    let home = match &options.name {
+        Some(name) => Some(Home::take(&context.state()?, name)?),
+        None => None,
+    };
+    let threads = options.threads.unwrap_or_else(processors);
+    let threads = u32::try_from(threads).ok().and_then(NonZeroU32::new);
+    let name = options.name.clone().unwrap_or_else(usual_name);
+    let config = agent::Config {
+        ahead: options.ahead,
+        state: home.as_ref().map(|home| home.folder.clone()),
+        build: daemon::software(),
+        memory_bytes: memory_bytes(),
+        ..agent::Config::new(coordinator, token, name, threads.unwrap_or(NonZeroU32::MIN))
+    };
+    let painter = RenderPainter::new(options.simd.unwrap_or_else(SimdLevel::best));
+    options.daemon.log()?;
+    let stop = Stop::on_signals()?;
+    options.daemon.stop_with_input(&stop);
+    let ended = daemon::block_on(async {
+        let (asks, heard) = mpsc::channel(1);
+        let told = tokio::spawn(async move {
+            stop.wait().await;
+            // A worker that has ended by itself needs no telling.
+            let _ = asks.send(Ask::Stop).await;
+        });
+        let ended = agent::run(config, Arc::new(painter), heard).await;
+        told.abort();
+        ended.map_err(cannot_run)
+    })?;
+    match ended {
+        ExitReason::Drained | ExitReason::Stopped => Ok(Ending::Done),
+        ExitReason::Refused { reason } => Err(Error::unreachable(format!(
+            "the coordinator at {coordinator} refuses this worker"
+        ))
+        .because(reason)),
+        ExitReason::GaveUp { reason } => Err(Error::unreachable(format!(
+            "the coordinator at {coordinator} was not reached for too long"
+        ))
+        .because(reason)
+        .next("start one with `flyby coordinator`, then this worker again")),
+    }
+}
+
+fn cannot_run(error: RunError) -> Error {
+    Error::failed("cannot run the worker").because(error)
+}
+
+/// The folder of a named worker, which this process alone uses.
+struct Home {
+    folder: PathBuf,
+    _lock: File,
+}
+
+impl Home {
+    fn take(state: &Path, name: &str) -> Result<Self, Error> {
+        let folder = state.join("workers").join(crate::existing::stem(name));
+        let attempt = || format!("cannot use the folder `{}`", folder.display());
+        fs::create_dir_all(&folder).map_err(|error| Error::failed(attempt()).because(error))?;
+        let lock = File::create(folder.join("lock"))
+            .map_err(|error| Error::failed(attempt()).because(error))?;
+        match lock.try_lock() {
+            Ok(()) => Ok(Self {
+                folder,
+                _lock: lock,
+            }),
+            Err(fs::TryLockError::WouldBlock) => Err(Error::failed(format!(
+                "another worker that is called `{name}` runs here"
+            ))
+            .next("choose another `--name`, or give none")),
+            Err(fs::TryLockError::Error(error)) => Err(Error::failed(attempt()).because(error)),
+        }
+    }
+}
+
+/// The machine's name and this process.
+fn usual_name() -> String {
+    let machine = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let machine = match machine.trim() {
+        "" => "worker",
+        name => name,
+    };
+    format!("{machine}-{}", std::process::id())
+}
+
+/// The memory of this machine; 0 where it is not known.
+fn memory_bytes() -> u64 {
+    let text = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    total_memory(&text).unwrap_or(0)
+}
+
+fn total_memory(meminfo: &str) -> Option<u64> {
+    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    kibibytes.checked_mul(1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_name_one_worker() {
+        let state = tempfile::tempdir().unwrap();
+        let first = Home::take(state.path(), "left").unwrap();
+        let second = Home::take(state.path(), "left").err().unwrap();
+        assert!(second.to_string().contains("another worker that is called `left`"));
+        drop(first);
+        assert!(Home::take(state.path(), "left").is_ok());
+    }
+
+    #[test]
+    fn memory_as_the_system_says_it() {
+        let said = "MemTotal:       16384 kB\nMemFree: 1 kB\n";
+        assert_eq!(total_memory(said), Some(16_384 * 1024));
+        assert_eq!(total_memory(""), None);
+    }
+}

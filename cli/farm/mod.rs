@@ -1,0 +1,7 @@
+//! What commands do with a coordinator: reach it, follow a job, fetch its frames, show what it says.
+
+pub(crate) mod fetch;
+pub(crate) mod follow;
+pub(crate) mod link;
+pub(crate) mod submit;
+pub(crate) mod view;
