@@ -113,35 +113,3 @@ pub(crate) fn values_gradients<S: Simd>(
         },
     );
 }
-
-#[cfg(test)]
-mod speed {
-    use super::*;
-    use crate::SimdLevel;
-    #[test]
-    fn speed() {
-        let mut cells = Cells::new();
-        let at: [Lanes; 3] = [0, 1, 2].map(|a| std::array::from_fn(|i| (i * (a + 1)) as f64 * 0.37 - 7.0));
-        let mut out = [0.0f32; BATCH];
-        let mut g = [[0.0f32; BATCH]; 3];
-        let op = crate::Op::Sum;
-        let c = crate::cascade::Cascade::new(op, &[0.0, 1.0, 2.0, 1.0, 8.0, 0.0, 1.0], 1.0).unwrap();
-        for level in SimdLevel::all_available() {
-            let time = |f: &mut dyn FnMut()| {
-                let mut best = f64::INFINITY;
-                for _ in 0..3000 {
-                    let t = std::time::Instant::now();
-                    for _ in 0..10 { f(); }
-                    best = best.min(t.elapsed().as_secs_f64());
-                }
-                10.0 * BATCH as f64 / best / 1e6
-            };
-            let n = std::hint::black_box(BATCH);
-            let a = time(&mut || { fearless_simd::dispatch!(level.token(), simd => split(simd, n, [&at[0], &at[1], &at[2]], &mut cells)); std::hint::black_box(&mut cells); });
-            let b = time(&mut || { fearless_simd::dispatch!(level.token(), simd => place(simd, n, &c.octaves[3], [&at[0], &at[1], &at[2]], &mut cells)); std::hint::black_box(&mut cells); });
-            let v = time(&mut || { fearless_simd::dispatch!(level.token(), simd => values(simd, n, Lattice::new(5), &cells, &mut out)); std::hint::black_box(&mut out); });
-            let w = time(&mut || { fearless_simd::dispatch!(level.token(), simd => values_gradients(simd, n, Lattice::new(5), &cells, &mut out, &mut g)); std::hint::black_box(&mut g); });
-            println!("{level}: split {a:.0} M/s, place {b:.0} M/s, value {v:.0} M/s, gradient {w:.0} M/s");
-        }
-    }
-}

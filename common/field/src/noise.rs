@@ -223,3 +223,161 @@ pub(crate) fn value_gradient(
     ];
     (lerp(w, e, f), gradient)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::hash::{hash, unit};
+
+    fn place(i: u32) -> [f64; 3] {
+        [0, 1, 2].map(|k| 4000.0 * unit(hash(&[i, k])) - 2000.0)
+    }
+
+    #[test]
+    fn the_noise_is_the_sum_of_its_kernels() {
+        let h = |t: f64| 1.0 - t.abs().powi(3) * (t.abs() * (6.0 * t.abs() - 15.0) + 10.0);
+        for i in 0..20_000 {
+            // Offsets that are f32, so that only the kernel's arithmetic differs.
+            let p = place(i).map(|x| x.floor() + f64::from(split(x).1));
+            let mut exact = 0.0;
+            for corner in 0..8 {
+                let node = [0, 1, 2].map(|k| p[k].floor() + f64::from((corner >> k) & 1));
+                // At a node the gradient is the node's own (thesis §4.3).
+                let (value, xi) = noise_gradient(7, node);
+                assert_eq!(value, 0.0);
+                assert!(
+                    xi.iter().filter(|part| part.abs() == 1.0).count() == 2 && xi.contains(&0.0),
+                    "{xi:?}"
+                );
+                let d = [0, 1, 2].map(|k| p[k] - node[k]);
+                exact += (xi[0] * d[0] + xi[1] * d[1] + xi[2] * d[2]) * h(d[0]) * h(d[1]) * h(d[2]);
+            }
+            let value = noise(7, p);
+            assert!(
+                (value - exact).abs() < ROUNDING / 4.0,
+                "{p:?}: {value} {exact}"
+            );
+            assert_eq!(value, noise_gradient(7, p).0);
+        }
+    }
+
+    #[test]
+    fn values_and_slopes_stay_below_their_bounds_and_come_near() {
+        let (mut highest, mut steepest, mut mean) = (0.0f64, 0.0f64, 0.0);
+        for i in 0..400_000 {
+            let (value, [x, y, z]) = noise_gradient(3, place(i));
+            highest = highest.max(value.abs());
+            steepest = steepest.max((x * x + y * y + z * z).sqrt());
+            mean += value / 400_000.0;
+        }
+        assert!(highest > 0.9 && highest <= RANGE, "{highest}");
+        assert!(steepest > 2.75 && steepest <= SLOPE, "{steepest}");
+        assert!(mean.abs() < 3e-3, "{mean}");
+    }
+
+    /// h and h′.
+    fn profile(t: f64) -> (f64, f64) {
+        let a = t.abs();
+        let slope = -30.0 * (a * (1.0 - a)) * (a * (1.0 - a));
+        (
+            1.0 - a * a * a * (a * (6.0 * a - 15.0) + 10.0),
+            slope.copysign(-t),
+        )
+    }
+
+    /// The highest value at an offset, and the steepest slope along a direction, that any choice of gradients gives.
+    fn suprema(t: [f64; 3], along: [f64; 3]) -> (f64, f64) {
+        // The best of the twelve gradients adds up the two largest components of what it is multiplied with.
+        let best = |mut v: [f64; 3]| {
+            v = v.map(f64::abs);
+            v.sort_by(f64::total_cmp);
+            v[1] + v[2]
+        };
+        let (mut highest, mut steepest) = (0.0, 0.0);
+        for corner in 0..8 {
+            let d = [0, 1, 2].map(|k| t[k] - f64::from((corner >> k) & 1));
+            let [(hx, sx), (hy, sy), (hz, sz)] = d.map(profile);
+            let weight = hx * hy * hz;
+            let slope = sx * hy * hz * along[0] + hx * sy * hz * along[1] + hx * hy * sz * along[2];
+            highest += weight * best(d);
+            steepest += best([0, 1, 2].map(|k| weight * along[k] + slope * d[k]));
+        }
+        (highest, steepest)
+    }
+
+    #[test]
+    fn no_choice_of_gradients_exceeds_the_bounds() {
+        let (mut highest, mut steepest) = (0.0f64, 0.0f64);
+        for i in 0..300_000 {
+            let part = |k: u32| unit(hash(&[i, k]));
+            let along = [3, 4, 5].map(|k| part(k) - 0.5);
+            let length = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]).sqrt();
+            let (high, steep) = suprema([part(0), part(1), part(2)], along.map(|a| a / length));
+            highest = highest.max(high);
+            steepest = steepest.max(steep);
+        }
+        assert!(highest > 1.03 && highest < RANGE - 5e-4, "{highest}");
+        assert!(steepest > 3.5 && steepest <= SLOPE, "{steepest}");
+        let centre = suprema([0.5; 3], [1.0, 0.0, 0.0]).1;
+        assert!((centre - SLOPE).abs() < 1e-12, "{centre}");
+    }
+
+    #[test]
+    fn all_twelve_gradients_are_alike() {
+        let mut counts = std::collections::BTreeMap::new();
+        for i in 0..120_000 {
+            let node = [0, 1, 2].map(|k| f64::from(hash(&[i, k]).cast_signed()));
+            let (_, g) = noise_gradient(1, node);
+            *counts
+                .entry(g.map(|part| {
+                    if part > 0.5 {
+                        1
+                    } else if part < -0.5 {
+                        -1
+                    } else {
+                        0
+                    }
+                }))
+                .or_insert(0) += 1;
+        }
+        assert_eq!(counts.len(), 12);
+        assert!(
+            counts.values().all(|count| (9_500..10_500).contains(count)),
+            "{counts:?}"
+        );
+    }
+
+    #[test]
+    fn neighbours_in_the_lattice_are_independent() {
+        for axis in 0..3 {
+            let (mut dot, mut n) = (0.0, 0.0);
+            for i in 0..60_000 {
+                let node = [0, 1, 2].map(|k| f64::from(hash(&[i, k]) % 512) - 256.0);
+                let mut next = node;
+                next[axis] += 1.0;
+                let ((_, g), (_, k)) = (noise_gradient(2, node), noise_gradient(2, next));
+                dot += g[0] * k[0] + g[1] * k[1] + g[2] * k[2];
+                n += 1.0;
+            }
+            // Each product has variance 4/3, so the mean 0.0047.
+            assert!((dot / n).abs() < 0.02, "axis {axis}: {}", dot / n);
+        }
+    }
+
+    #[test]
+    fn cells_are_told_apart_at_planetary_distances_and_wrap_at_two_to_the_32() {
+        let far = 6_371_000.0 * 8.0;
+        assert_ne!(noise(1, [far + 0.3, 0.2, 0.6]), noise(1, [0.3, 0.2, 0.6]));
+        let step = noise(1, [far + 0.3 + 1e-6, 0.2, 0.6]) - noise(1, [far + 0.3, 0.2, 0.6]);
+        assert!(step.abs() < 1e-5);
+        let around = 4_294_967_296.0;
+        assert_eq!(
+            noise(1, [0.25, 0.5, 0.75]),
+            noise(1, [around + 0.25, 0.5 - around, 0.75])
+        );
+        assert_eq!(split(-0.0), (0, -0.0));
+        assert_eq!(split(-1.5), (u32::MAX - 1, 0.5));
+        assert_eq!(noise(1, [1e300, -1e300, 4e18]), 0.0);
+        assert!(noise(1, [f64::INFINITY, 0.0, 0.0]).is_nan());
+    }
+}
