@@ -151,7 +151,7 @@ pub(crate) struct Arrived {
     /// What was counted.
     pub(crate) counters: Vec<(String, u64)>,
     /// Held until the block is durable or refused, so that only so many are under way.
-    pub(crate) permit: OwnedSemaphorePermit,
+    pub(crate) _permit: OwnedSemaphorePermit,
 }
 
 impl Arrived {

@@ -123,9 +123,9 @@ impl Link {
             reason: reason.to_owned(),
         };
         if self.say(control_up::Message::Goodbye(goodbye)).is_ok() {
-            // The coordinator ends its stream when it has read the goodbye.
+            // The coordinator ends both streams when it has read the goodbye. The delivery stream
+            // stays open until then: its end would end the link before the goodbye has left.
             self.control = None;
-            self.delivery = None;
             let ended = tokio::time::timeout(GOODBYE_TIMEOUT, &mut self.task).await;
             if ended.is_err() {
                 tracing::debug!("the goodbye may not have arrived");

@@ -108,13 +108,20 @@ impl Pool {
     }
 
     /// Stops everything, and waits for the threads.
-    pub(crate) fn end(self) {
+    pub(crate) fn end(mut self) {
         self.shared.end();
-        for thread in self.threads {
+        for thread in std::mem::take(&mut self.threads) {
             if thread.join().is_err() {
                 tracing::error!("a render thread died of a mistake in this program");
             }
         }
+    }
+}
+
+/// Ends the threads at their next chance, without waiting for them.
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.shared.end();
     }
 }
 

@@ -8,7 +8,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use model::{AttemptId, Rect, Timestamp, WorkerId};
-use session::{BlockVerdict, Effect, Event, ExitReason, Retry, Session};
+use session::{BlockVerdict, Event, ExitReason, Retry, Session};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
 use wire::failure;
@@ -145,7 +145,8 @@ impl Shell {
     async fn take(&mut self, input: Input) {
         match input {
             Input::Dialled(number, clients) if self.is_newest(number) => {
-                self.fetching.send_replace(Some(clients.control.clone()));
+                // Beside what little comes down on it, pixels only go up on this one.
+                self.fetching.send_replace(Some(clients.delivery.clone()));
                 self.clients = Some(*clients);
                 self.feed(Event::Dialled).await;
             }

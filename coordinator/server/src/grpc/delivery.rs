@@ -124,7 +124,7 @@ impl Listener {
                     payload,
                     elapsed: Span(delivery.render_us),
                     counters,
-                    permit,
+                    _permit: permit,
                 };
                 return self
                     .inputs

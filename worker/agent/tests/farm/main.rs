@@ -1,0 +1,9 @@
+//! Coordinator and workers in one process, over loopback, with a painter whose pixels
+//! are known: what a user and a worker see of a farm, and what is left behind.
+
+mod faults;
+mod harness;
+mod hostile;
+mod jobs;
+mod painter;
+mod proxy;
