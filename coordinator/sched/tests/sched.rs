@@ -587,3 +587,42 @@ fn refusals_say_what_to_do() {
     assert!(SubmitRefusal::TooManyJobs { max: 1 }.is_retryable());
     assert!(WorkerRefusal::TooMany { max: 1 }.is_retryable());
 }
+
+#[test]
+fn a_lost_worker_is_no_blame_where_a_block_arrived_in_between() {
+    let mut farm = Farm::new(Config {
+        tile_losses_max: 2,
+        ..Config::new(EPOCH)
+    });
+    farm.job(1).worker(1, 1).heartbeat(1, &[(1, 0)]);
+    farm.waits(LIVENESS).worker(2, 1);
+    farm.stores(2, 2, 0, block(0)).waits(LIVENESS).never_mind();
+    let job = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!((job.state, job.attempts_lost), (JobState::Running, 2));
+}
+
+#[test]
+fn nobody_claims_progress_beyond_the_tile() {
+    let mut farm = farm();
+    farm.job(1).worker(1, 1);
+    farm.waits(Span::from_millis(1)).stores(1, 1, 0, block(0));
+    farm.heartbeat(1, &[(1, 2)]).never_mind();
+    for claimed in 3..33 {
+        farm.heartbeat(1, &[(1, claimed)]).waits(Span::from_secs(1));
+    }
+    let ended = revoke(1, 1, RevokeReason::NoProgress);
+    assert_eq!(farm.never_mind().first(), Some(&ended));
+}
+
+#[test]
+fn credit_has_a_limit() {
+    let mut farm = Farm::new(Config {
+        limits: Limits {
+            credit_max: 1,
+            ..Limits::default()
+        },
+        ..Config::new(EPOCH)
+    });
+    farm.job(1).worker(1, 100);
+    assert_eq!(farm.sched.worker(worker(1)).unwrap().attempts, 1);
+}

@@ -386,3 +386,69 @@ fn asked_to_stop_twice_or_without_a_link_it_exits_at_once() {
     worker.leased([1]).is_told(lost()).never_mind();
     worker.is_told(Event::StopAsked).wants(&[exit]);
 }
+
+#[test]
+fn another_epoch_numbers_its_attempts_anew() {
+    let mut worker = Situation::connected(config());
+    worker.leased([5]).is_told(lost());
+    worker
+        .waits(Span::from_millis(100))
+        .is_told(Event::Dialled)
+        .is_told(welcome_in(Epoch(2), &[]))
+        .never_mind();
+    let mut anew = lease(1);
+    anew.attempt.epoch = Epoch(2);
+    worker
+        .is_told(Event::Leased(anew.clone()))
+        .wants(&[Effect::StartTile { lease: anew }]);
+}
+
+#[test]
+fn a_block_waiting_to_be_sent_again_is_sent_once_on_a_new_link() {
+    let mut worker = Situation::connected(config());
+    worker
+        .leased([1])
+        .is_told(rendered(1, 0))
+        .is_told(Event::BlockRefused {
+            attempt: attempt(1),
+            rect: block(0),
+            verdict: BlockVerdict::Later,
+        })
+        .is_told(lost())
+        .waits(Span::from_millis(100))
+        .never_mind();
+    worker
+        .is_told(Event::Dialled)
+        .is_told(welcome(&[1]))
+        .waits(Span::from_secs(3));
+    let effects = worker.never_mind();
+    let sent = effects.iter().filter(|effect| **effect == send(1, 0));
+    assert_eq!(sent.count(), 1);
+}
+
+#[test]
+fn a_link_that_lasted_makes_the_next_wait_short() {
+    let mut worker = Situation::new(config());
+    worker.is_told(Event::Started);
+    for _ in 0..6 {
+        worker.is_told(lost()).waits(Span::from_secs(1));
+    }
+    worker.is_told(Event::Dialled).is_told(welcome(&[]));
+    worker.waits(INTERVAL).is_told(lost()).never_mind();
+    worker
+        .waits(Span::from_millis(100))
+        .wants(&[Effect::Connect]);
+}
+
+#[test]
+fn what_is_held_outlives_the_limit_once_the_link_is_back() {
+    let mut worker = Situation::connected(config());
+    worker
+        .leased([1, 2])
+        .is_told(lost())
+        .waits(Span::from_millis(100))
+        .is_told(Event::Dialled)
+        .is_told(welcome(&[1, 2]))
+        .waits(Span::from_secs(10));
+    assert_eq!(worker.session.summary().waiting, 1);
+}
