@@ -2,6 +2,7 @@
 
 mod completions;
 mod coordinator;
+mod demo;
 mod image;
 mod job;
 mod render;
@@ -48,6 +49,8 @@ pub(crate) struct Cli {
 
 #[derive(Subcommand, Debug)]
 enum Command {
+    /// Renders a short flyby with a whole farm on this machine: the first thing to run.
+    Demo(demo::Demo),
     /// Renders frames here, in this process; interrupted, it goes on where it was.
     Render(render::Render),
     /// Runs a coordinator until it is told to stop.
@@ -78,6 +81,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         state: cli.state.or(state),
     };
     match cli.command {
+        Command::Demo(options) => demo::run(&context, &options),
         Command::Render(options) => render::run(&context, &options),
         Command::Coordinator(options) => coordinator::run(&context, &options),
         Command::Worker(command) => worker::run(&context, command),

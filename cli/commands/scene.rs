@@ -4,8 +4,9 @@ use std::io::{self, Write};
 use std::path::PathBuf;
 
 use clap::Subcommand;
-use scene::{Mistake, Source};
+use scene::{Mistake, Source, Summary};
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::error::{Ending, Error};
 use crate::load::{self, Scene};
@@ -16,12 +17,18 @@ use crate::output::{self, Format, Report};
 pub(crate) enum SceneCommand {
     /// Reports every mistake of a scene with its place (exit code 2 if there is one).
     Check(SceneOptions),
+    /// Says what a scene holds once it is read: size, frames, camera, fields, digest.
+    Show(SceneOptions),
+    /// Prints the JSON Schema of scene files, which editors complete and check by.
+    Schema,
 }
 
 /// Runs the command.
 pub(crate) fn run(context: &Context, command: SceneCommand) -> Result<Ending, Error> {
     match command {
         SceneCommand::Check(options) => check(context, &options),
+        SceneCommand::Show(options) => show(context, &options),
+        SceneCommand::Schema => schema(),
     }
 }
 
@@ -117,4 +124,44 @@ impl Report for Check {
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(out, "{}", self.digest.as_deref().unwrap_or_default())
     }
+}
+
+/// `scene show`: the scene's own summary.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct Show(Summary);
+
+fn show(context: &Context, options: &SceneOptions) -> Result<Ending, Error> {
+    let scene = options.load()?;
+    let summary = scene::describe(scene.description())
+        .map_err(|error| Error::usage("this scene cannot be rendered").because(error))?;
+    output::print(context.output, &Show(summary))?;
+    Ok(Ending::Done)
+}
+
+impl Report for Show {
+    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
+        let fields = serde_json::to_value(&self.0).map_err(io::Error::other)?;
+        for (name, value) in fields.as_object().into_iter().flatten() {
+            let name = name.replace('_', " ");
+            match value {
+                Value::String(text) => writeln!(out, "{name:<16} {text}")?,
+                value => writeln!(out, "{name:<16} {value}")?,
+            }
+        }
+        Ok(())
+    }
+
+    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.0.digest)
+    }
+}
+
+fn schema() -> Result<Ending, Error> {
+    let mut out = io::stdout().lock();
+    serde_json::to_writer_pretty(&mut out, &scene::schema())
+        .map_err(io::Error::from)
+        .and_then(|()| writeln!(out))
+        .map_err(|error| Error::failed("cannot print the schema").because(error))?;
+    Ok(Ending::Done)
 }

@@ -98,7 +98,6 @@ pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> 
             formats: options.files.formats(),
             settings_json: options.scene.settings_json(),
         },
-        farm: &options.farm,
         target: options.out.as_deref().map(|folder| Target {
             folder,
             existing: options.files.existing,
@@ -106,7 +105,8 @@ pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> 
         }),
         watch: options.watch,
     };
-    let report = order.carry_out(context)?;
+    let stop = Stop::on_signals()?;
+    let report = order.carry_out(&stop, || Ok((context.clone(), options.farm.clone(), ())))?;
     output::print(context.output, &report)?;
     Ok(report.result.as_ref().map_or(Ending::Done, ending))
 }
@@ -115,8 +115,6 @@ pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> 
 pub(crate) struct Order<'a> {
     /// The job.
     pub(crate) submission: Submission<'a>,
-    /// Where the coordinator is.
-    pub(crate) farm: &'a FarmOptions,
     /// Where its frames go, if anywhere.
     pub(crate) target: Option<Target<'a>>,
     /// Whether to wait for its end even if nothing is fetched.
@@ -137,8 +135,14 @@ pub(crate) struct Target<'a> {
 impl Order<'_> {
     /// Submits what is not there yet, and waits for it where that is asked for.
     ///
-    /// Fails as interrupted where the user stops waiting; the job then goes on.
-    pub(crate) fn carry_out(mut self, context: &Context) -> Result<SubmitReport, Error> {
+    /// `farm` is asked for a coordinator once there is something to submit; what it answers
+    /// last is kept until the job is over. Fails as interrupted where the user stops
+    /// waiting; the job then goes on.
+    pub(crate) fn carry_out<G>(
+        mut self,
+        stop: &Stop,
+        farm: impl FnOnce() -> Result<(Context, FarmOptions, G), Error>,
+    ) -> Result<SubmitReport, Error> {
         let all = self.submission.frames;
         let images: Vec<ImageNumber> = all.iter().collect();
         let stem = self.stem();
@@ -158,30 +162,39 @@ impl Order<'_> {
             Some(missing) => {
                 self.submission.frames = missing;
                 report.frames = missing.to_string();
-                self.submit(context, &mut report)?;
+                let (context, farm, _guard) = farm()?;
+                self.submit(&context, &farm, stop, &mut report)?;
             }
         }
         if let Some(target) = self.target.filter(|target| target.movie && report.is_whole()) {
             let frames = images.iter().map(|image| target.folder.join(frame_name(&stem, *image, Format::Png8)));
             let fps = self.submission.scene.description().film.fps;
             let frames: Vec<PathBuf> = frames.collect();
-            report.movie = movie_of(target.folder, &stem, &frames, fps, &Stop::on_signals()?)?;
+            report.movie = movie_of(target.folder, &stem, &frames, fps, stop)?;
         }
         Ok(report)
     }
 
-    fn submit(&self, context: &Context, report: &mut SubmitReport) -> Result<(), Error> {
-        let waits = self.watch || self.target.is_some();
-        // Before the job exists, Ctrl-C simply ends this program.
-        let job = block_on(self.submission.hand_in(context, self.farm))?;
+    fn submit(
+        &self,
+        context: &Context,
+        farm: &FarmOptions,
+        stop: &Stop,
+        report: &mut SubmitReport,
+    ) -> Result<(), Error> {
+        let job = block_on(async {
+            tokio::select! {
+                () = stop.wait() => Err(Error::interrupted("interrupted while submitting")
+                    .next("`flyby job list` says whether the job was taken")),
+                job = self.submission.hand_in(context, farm) => job,
+            }
+        })?;
         let (name, frames) = (self.submission.name, self.submission.frames);
         say(format_args!("job {job}: {name}, frames {frames}"));
         report.job = Some(job.0);
-        if waits {
-            let stop = Stop::on_signals()?;
+        if self.watch || self.target.is_some() {
             let target = self.target.map(|target| (target.folder, target.existing));
-            let followed = until_over(context, self.farm, job, &stop, target);
-            let (whole, fetched) = block_on(followed)?;
+            let (whole, fetched) = block_on(until_over(context, farm, job, stop, target))?;
             report.take(whole, fetched);
         }
         Ok(())

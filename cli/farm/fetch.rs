@@ -42,14 +42,6 @@ pub(crate) enum Fetched {
     Kept(PathBuf),
 }
 
-impl Fetched {
-    /// Where it is.
-    pub(crate) fn path(&self) -> &Path {
-        let (Self::New(path) | Self::Kept(path)) = self;
-        path
-    }
-}
-
 impl Fetcher<'_> {
     /// Fetches the files of images as they are finished, until no more will be.
     pub(crate) async fn all(
