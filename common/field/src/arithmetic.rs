@@ -168,6 +168,10 @@ pub(crate) fn power_slope(exponent: f64, a: f64, f: f64) -> f64 {
 
 /// 0 below 0, 1 above 1.
 #[inline(always)]
+#[expect(
+    clippy::manual_clamp,
+    reason = "comparisons are the definition, NaN and −0 included"
+)]
 pub(crate) fn clamp01(a: f64) -> f64 {
     if a < 0.0 {
         0.0

@@ -150,7 +150,7 @@ impl Graph {
         let counted = match signature.params {
             Params::Named(names) => params.len() == names.len(),
             Params::Keys => {
-                !params.is_empty() && params.len() % 2 == 0 && params.len() <= 2 * KEYS_MAX
+                !params.is_empty() && params.len().is_multiple_of(2) && params.len() <= 2 * KEYS_MAX
             }
         };
         if !fits || !counted {
@@ -194,7 +194,7 @@ fn check_ranges(op: Op, params: &[f64]) -> Result<(), GraphError> {
             "hurst" if !(-4.0..=4.0).contains(&value) => {
                 return refuse("a Hurst coefficient from -4 to 4", value);
             }
-            "octaves" if value < 1.0 || value > OCTAVES_MAX || value % 1.0 != 0.0 => {
+            "octaves" if !(1.0..=OCTAVES_MAX).contains(&value) || value % 1.0 != 0.0 => {
                 return refuse("1 to 48 whole octaves", value);
             }
             "detail" if !(0.0..=16.0).contains(&value) => {

@@ -37,7 +37,7 @@ impl Pairs {
             let number = |k: u32| 2.0 * unit(hash(&[99, i, k])) - 1.0;
             let p = place([number(0), number(1), number(2)]);
             let distance = reach * libm::exp2(-15.0 + 15.0 * number(3));
-            let q = [0, 1, 2].map(|k| p[k] + distance * number(4 + k as u32));
+            let q = [0, 1, 2].map(|k| p[k] + distance * number([4, 5, 6][k]));
             let q = if inside(region, q) {
                 q
             } else {

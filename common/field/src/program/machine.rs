@@ -17,6 +17,7 @@ const STEP: usize = 16;
 
 /// The registers of values.
 #[derive(Debug)]
+#[expect(clippy::vec_box, reason = "results take their places by pointer")]
 pub(crate) struct Machine {
     registers: Vec<Box<Lanes>>,
     /// What the constant registers hold.
@@ -142,13 +143,7 @@ impl Machine {
         match &instruction.act {
             Operation::Unary(unary) => unary_lanes(*unary, n, a, out),
             Operation::Binary(binary) => binary_lanes(*binary, n, a, b, out),
-            Operation::Select => each3(
-                n,
-                [a, b, c],
-                out,
-                #[inline(always)]
-                |a, b, c| arithmetic::select(a, b, c),
-            ),
+            Operation::Select => each3(n, [a, b, c], out, arithmetic::select),
             Operation::Length => each3(
                 n,
                 [a, b, c],

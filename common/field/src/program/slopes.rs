@@ -164,13 +164,7 @@ impl Slopes {
                     ),
                 },
             ),
-            Operation::Length => each3(
-                n,
-                [a, b, c],
-                out,
-                #[inline(always)]
-                |a, b, c| length(a, b, c),
-            ),
+            Operation::Length => each3(n, [a, b, c], out, length),
             Operation::OntoSphere(radius) => each(
                 n,
                 a,
