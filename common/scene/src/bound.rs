@@ -9,7 +9,7 @@ use crate::description::{Bound, Description, Seed};
 use crate::rules::{LENGTH_MAX, Problem};
 use crate::show;
 
-/// The bound is found to this part of its distance from the seed.
+/// A bound is found to this part of its thickness.
 const PRECISION: f64 = 1.0 / 256.0;
 
 /// The instants at which a scene can be seen.
@@ -73,39 +73,49 @@ impl<'a> Prover<'a> {
 
     /// The shell around a sphere of that radius (0: around anything about the origin).
     fn shell(&self, radius: f64) -> Option<Bound> {
-        let outside = |d: f64| Region::Shell {
-            inner: radius + d,
-            outer: f64::INFINITY,
+        let empty = |r: f64| {
+            self.positive(Region::Shell {
+                inner: r,
+                outer: f64::INFINITY,
+            })
         };
-        let inside = |d: f64| Region::Shell {
-            inner: 0.0,
-            outer: radius - d,
+        let solid = |r: f64| {
+            self.negative(Region::Shell {
+                inner: 0.0,
+                outer: r,
+            })
         };
-        let out = least(scale_of(radius), LENGTH_MAX, |d| self.positive(outside(d)))?;
-        let depth = if radius > 0.0 {
-            least(scale_of(radius), radius, |d| self.negative(inside(d)))
+        let outer = radius + first(|d| empty(radius + d))?;
+        let depth = first(|d| d < radius && solid(radius - d));
+        let inner = depth.map_or(0.0, |depth| radius - depth);
+        let outer = last(inner, outer, |r| !empty(r)).1;
+        let inner = if inner > 0.0 {
+            last(inner, outer, solid).0
         } else {
-            None
+            0.0
         };
-        Some(Bound::Shell {
-            inner: depth.map_or(0.0, |depth| radius - depth),
-            outer: radius + out,
-        })
+        Some(Bound::Shell { inner, outer })
     }
 
     /// The slab around a terrain on the plane.
     fn slab(&self) -> Option<Bound> {
-        let above = |d: f64| Region::Slab {
-            low: d,
-            high: f64::INFINITY,
+        let empty = |z: f64| {
+            self.positive(Region::Slab {
+                low: z,
+                high: f64::INFINITY,
+            })
         };
-        let below = |d: f64| Region::Slab {
-            low: f64::NEG_INFINITY,
-            high: -d,
+        let solid = |z: f64| {
+            self.negative(Region::Slab {
+                low: f64::NEG_INFINITY,
+                high: z,
+            })
         };
-        let high = least(scale_of(0.0), LENGTH_MAX, |d| self.positive(above(d)))?;
-        let low = least(scale_of(0.0), LENGTH_MAX, |d| self.negative(below(d)))?;
-        Some(Bound::Slab { low: -low, high })
+        let high = first(empty)?;
+        let low = -first(|d| solid(-d))?;
+        let high = last(low, high, |z| !empty(z)).1;
+        let low = last(low, high, solid).0;
+        Some(Bound::Slab { low, high })
     }
 
     /// A summand of the field that nothing bounds far from the origin.
@@ -140,7 +150,7 @@ impl<'a> Prover<'a> {
             let program = Program::compile(&surface.graph, &[id], time_of(self.scene)).ok()?;
             let range = *program.range(&around(self.scene, far)).first()?;
             let least = if negated { -range.high } else { range.low };
-            (least == f64::NEG_INFINITY).then(|| show::node(&surface.graph, id, 60))
+            (!(least > -LENGTH_MAX)).then(|| show::node(&surface.graph, id, 60))
         })
     }
 }
@@ -154,30 +164,103 @@ fn around(scene: &Description, region: Region) -> Surroundings {
     }
 }
 
-/// The smallest distance worth looking at: a millionth of the seed's size, or of a metre.
-fn scale_of(radius: f64) -> f64 {
-    if radius > 0.0 { radius * 1e-9 } else { 1e-6 }
+/// A distance for which `holds`, if there is one up to [`LENGTH_MAX`]; it doubles from a millimetre on.
+fn first(holds: impl Fn(f64) -> bool) -> Option<f64> {
+    let mut distance = 1e-3;
+    while distance <= LENGTH_MAX {
+        if holds(distance) {
+            return Some(distance);
+        }
+        distance *= 2.0;
+    }
+    None
 }
 
-/// The least distance from `start` to `limit` for which `holds`, which is then true of all larger ones;
-/// a little larger where `holds` wavers.
-fn least(start: f64, limit: f64, holds: impl Fn(f64) -> bool) -> Option<f64> {
-    let mut low = 0.0;
-    let mut high = start;
-    while !holds(high) {
-        low = high;
-        high *= 2.0;
-        if high > limit {
-            return None;
-        }
-    }
-    while high - low > PRECISION * high {
+/// Two numbers close together between `low` and `high`: `holds` up to the first, no more at the second.
+///
+/// It holds at `low` and not at `high`, or both are given back.
+fn last(low: f64, high: f64, holds: impl Fn(f64) -> bool) -> (f64, f64) {
+    let precision = PRECISION * (high - low);
+    let (mut low, mut high) = (low, high);
+    while high - low > precision {
         let middle = low + (high - low) / 2.0;
         if holds(middle) {
-            high = middle;
-        } else {
             low = middle;
+        } else {
+            high = middle;
         }
     }
-    Some(high)
+    (low, high)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::{Overrides, Source, parse};
+
+    fn bound_of(surface: &str) -> Result<Bound, String> {
+        let text = format!(
+            "camera.fixed = {{ eye = [0, -900, 50], target = [0, 0, 0] }}\n[surface]\n{surface}"
+        );
+        let source = Source {
+            name: "test".into(),
+            text,
+        };
+        match parse(source, "test", Path::new("."), &Overrides::default()) {
+            Ok(loaded) => Ok(loaded.description.surface.bound),
+            Err(error) => Err(error.to_string()),
+        }
+    }
+
+    #[test]
+    fn bounds_are_tight_around_what_is_known() {
+        let bound = bound_of("sphere.radius = 100\nfield = \"seed - 8 - 4*noise(base)\"");
+        let Ok(Bound::Shell { inner, outer }) = bound else {
+            panic!("{bound:?}")
+        };
+        assert!(
+            (103.5..104.0).contains(&inner) && (112.0..112.6).contains(&outer),
+            "{bound:?}"
+        );
+        let bound = bound_of("plane = {}\nfield = \"p.z - 10 - 2*sin(p.x)\"");
+        let Ok(Bound::Slab { low, high }) = bound else {
+            panic!("{bound:?}")
+        };
+        assert!(
+            (7.5..8.0).contains(&low) && (12.0..12.5).contains(&high),
+            "{bound:?}"
+        );
+    }
+
+    #[test]
+    fn things_without_a_ground_get_a_shell() {
+        let bound = bound_of("plane = {}\nfield = \"length(p) - 3\"");
+        let Ok(Bound::Shell { inner, outer }) = bound else {
+            panic!("{bound:?}")
+        };
+        assert!(inner == 0.0 && (3.0..3.1).contains(&outer), "{bound:?}");
+    }
+
+    #[test]
+    fn what_has_no_end_is_named() {
+        for (surface, term) in [
+            (
+                "plane = {}\nfield = \"p.x - noise(p)\"",
+                "nothing bounds `p.x`",
+            ),
+            (
+                "sphere.radius = 1\nfield = \"seed + 3*p.z\"",
+                "nothing bounds `(3*p.z)`",
+            ),
+            (
+                "sphere.radius = 1\nfield = \"noise(p)\"",
+                "not proven positive far away",
+            ),
+        ] {
+            let error = bound_of(surface).unwrap_err();
+            assert!(error.contains(term), "{surface}: {error}");
+        }
+    }
 }

@@ -8,7 +8,7 @@
 //! [`crate::bound`], whoever wrote it.
 
 mod assets;
-pub(crate) mod keys;
+mod keys;
 mod mistake;
 mod overrides;
 mod quantity;
@@ -19,9 +19,10 @@ mod tree;
 use std::path::Path;
 use std::sync::Arc;
 
+pub(crate) use keys::{Key, Presence, SCENE, Shape};
 pub use mistake::{Mistake, Place, SceneError, Source};
 pub use overrides::Overrides;
-pub(crate) use quantity::nearest;
+pub(crate) use quantity::{Dimension, nearest};
 
 use crate::description::{AssetRef, Description};
 use section::Reader;
@@ -98,3 +99,6 @@ pub fn parse(
         Err(mistakes) => Err(SceneError::new(sources, mistakes)),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -26,27 +26,31 @@ pub(crate) fn problems(scene: &Description) -> Vec<Problem> {
     let times = instants(scene);
     let eyes: Vec<Vector> = times.iter().map(|&time| flight.pose(time).eye).collect();
     let values = field.at(&eyes, &times);
-    if let Some(inside) = values.iter().position(|value| *value <= 0.0) {
-        return vec![Problem {
-            key: path_key(&scene.camera.path).to_owned(),
-            message: format!(
-                "the camera is inside the surface at frame {}",
-                frame(scene, times[inside])
-            ),
-            help: Some(match &scene.camera.path {
-                Path::GreatCircle(_) => "raise the altitude".into(),
-                _ => "move the eye to where the field is positive".into(),
-            }),
-        }];
+    if let (Path::GreatCircle(circle), Bound::Shell { inner, outer }) =
+        (&scene.camera.path, surface.bound)
+    {
+        // From inside the ground its surface is looked for from above.
+        let tops = eyes.iter().zip(&values).map(
+            |(eye, value)| {
+                if *value > 0.0 { length(*eye) } else { outer }
+            },
+        );
+        let ground = ground_below(&field, inner, tops.collect(), &eyes, &times);
+        return clearance(scene, circle, &ground, &eyes, &times)
+            .into_iter()
+            .collect();
     }
-    match (&scene.camera.path, surface.bound) {
-        (Path::GreatCircle(circle), Bound::Shell { inner, .. }) => {
-            clearance(scene, circle, &field, inner, &eyes, &times)
-                .into_iter()
-                .collect()
-        }
-        _ => Vec::new(),
-    }
+    let Some(inside) = values.iter().position(|value| *value <= 0.0) else {
+        return Vec::new();
+    };
+    vec![Problem {
+        key: path_key(&scene.camera.path).to_owned(),
+        message: format!(
+            "the camera is inside the surface at frame {}",
+            frame(scene, times[inside])
+        ),
+        help: Some("move the eye to where the field is positive".into()),
+    }]
 }
 
 fn path_key(path: &Path) -> &'static str {
@@ -78,44 +82,49 @@ fn frame(scene: &Description, time: f64) -> f64 {
     libm::floor(time * scene.film.fps + 1e-9)
 }
 
-/// The ground below the path, held to the clearance.
+/// The ground's distances from the centre, held to the clearance.
 fn clearance(
     scene: &Description,
     circle: &GreatCircle,
-    field: &Field,
-    inner: f64,
+    ground: &[f64],
     eyes: &[Vector],
     times: &[f64],
 ) -> Option<Problem> {
-    let ground = ground_below(field, inner, eyes, times);
     let heights = eyes
         .iter()
-        .zip(&ground)
+        .zip(ground)
         .map(|(eye, ground)| length(*eye) - ground);
     let (worst, height) = heights.enumerate().min_by(|a, b| a.1.total_cmp(&b.1))?;
-    if height >= circle.clearance {
+    if height > 0.0 && height >= circle.clearance {
         return None;
     }
-    let highest = ground[worst] - circle.radius;
+    let (frame, highest) = (frame(scene, times[worst]), ground[worst] - circle.radius);
+    let places = format!(
+        "the ground is at {highest:.2} m, the camera at {} m",
+        circle.altitude
+    );
+    let message = if height > 0.0 {
+        let missing = circle.clearance - height;
+        format!("the path passes {missing:.2} m under its clearance at frame {frame}: {places}")
+    } else {
+        format!("the path goes through the ground at frame {frame}: {places}")
+    };
+    let least = libm::ceil((highest + circle.clearance) * 10.0 + 1e-6) / 10.0;
     Some(Problem {
-        key: "camera.great_circle.clearance".into(),
-        message: format!(
-            "the path passes {:.2} m under its clearance of {} m at frame {}: \
-             the ground is at {highest:.2} m, the camera at {} m",
-            circle.clearance - height,
-            circle.clearance,
-            frame(scene, times[worst]),
-            circle.altitude
-        ),
-        help: Some(format!(
-            "raise the altitude to at least \"{:.1} m\"",
-            libm::ceil((highest + circle.clearance) * 10.0) / 10.0
-        )),
+        key: "camera.great_circle.altitude".into(),
+        message,
+        help: Some(format!("raise the altitude to at least \"{least:.1} m\"")),
     })
 }
 
-/// Distance from the centre of the first ground met on the way from each eye to the centre.
-fn ground_below(field: &Field, inner: f64, eyes: &[Vector], times: &[f64]) -> Vec<f64> {
+/// Distances from the centre of the first ground met on the way down from the tops over or under the eyes.
+fn ground_below(
+    field: &Field,
+    inner: f64,
+    tops: Vec<f64>,
+    eyes: &[Vector],
+    times: &[f64],
+) -> Vec<f64> {
     let downs: Vec<Vector> = eyes
         .iter()
         .map(|eye| direction(*eye).unwrap_or([0.0, 0.0, 1.0]))
@@ -128,7 +137,6 @@ fn ground_below(field: &Field, inner: f64, eyes: &[Vector], times: &[f64]) -> Ve
             .collect();
         field.at(&places, times)
     };
-    let tops: Vec<f64> = eyes.iter().map(|eye| length(*eye)).collect();
     // `above` is outside, `below` inside the surface once it has been found.
     let (mut above, mut below) = (tops.clone(), vec![None; tops.len()]);
     for step in 1..=STEPS {

@@ -13,8 +13,10 @@ mod expression;
 mod file;
 mod ground;
 pub mod rules;
+mod schema;
 mod show;
 mod spline;
+mod summary;
 mod sun;
 mod vector;
 
@@ -25,3 +27,5 @@ pub use description::Description;
 pub use file::{
     FILE_BYTES_MAX, Loaded, Mistake, Overrides, Place, SceneError, Source, load, parse,
 };
+pub use schema::schema;
+pub use summary::{AssetSummary, Summary, describe};

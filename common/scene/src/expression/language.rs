@@ -46,6 +46,8 @@ pub(super) const FUNCTIONS: &[&str] = &[
 pub(super) const REFUSED: &[&str] = &[
     "^",
     "^=",
+    "/=",
+    "**=",
     "switch",
     "eval",
     "import",

@@ -18,11 +18,12 @@ pub(super) struct Hint {
 
 /// A type's name as the scene's author would say it.
 pub(super) fn kind(type_name: &str) -> &str {
-    match type_name.rsplit("::").next().unwrap_or(type_name) {
+    let type_name = type_name.rsplit("::").next().unwrap_or(type_name);
+    match type_name {
         "i64" | "f64" => "a number",
         "Scalar" | "field" => "a field",
         "Vector" | "vector" => "a vector",
-        "string" | "ImmutableString" | "&str" => "text",
+        text if text.to_lowercase().contains("string") => "text",
         "array" => "an array",
         "map" => "a map",
         "bool" => "true or false",
@@ -51,12 +52,16 @@ pub(super) fn of_parsing(error: &ParseError) -> Refusal {
 fn parsing(error: &ParseErrorType) -> (String, Option<String>) {
     let symbol = match error {
         ParseErrorType::BadInput(LexError::ImproperSymbol(symbol, _))
+        | ParseErrorType::UnknownOperator(symbol)
         | ParseErrorType::Reserved(symbol) => symbol.as_str(),
         ParseErrorType::ExprTooDeep => {
             return (
                 "the expression is nested too deeply".into(),
                 Some("give parts of it names with `let`".into()),
             );
+        }
+        ParseErrorType::MissingToken(token, _) => {
+            return (format!("a `{token}` is missing"), None);
         }
         ParseErrorType::UnexpectedEOF => {
             return (
@@ -80,6 +85,10 @@ fn parsing(error: &ParseErrorType) -> (String, Option<String>) {
     };
     let (message, help) = match symbol {
         "^" | "^=" => ("`^` is not a power", "write 2**3"),
+        "/=" | "**=" => (
+            "this would keep whole numbers whole",
+            "write x = x / 2, x = x**2",
+        ),
         "switch" => (
             "there is no `switch`: a field differs from point to point",
             SELECT,

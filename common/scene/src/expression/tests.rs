@@ -1,1 +1,377 @@
+use std::time::{Duration, Instant};
 
+use super::*;
+use crate::show;
+
+fn fields() -> Fields {
+    let curves = [
+        (
+            "wave".to_owned(),
+            Curve::Linear(vec![(0.0, 0.0), (1.0, 2.0)]),
+        ),
+        ("four".to_owned(), Curve::Constant(4.0)),
+    ];
+    Fields::new(Seed::Sphere { radius: 2.0 }, curves.into())
+}
+
+/// The field as its graph says it.
+fn read(text: &str) -> String {
+    let fields = fields();
+    match fields.field(text) {
+        Ok(id) => show::node(&fields.into_graph(), id, 1000),
+        Err(refusal) => format!("refused: {}", refusal.message),
+    }
+}
+
+fn refused(text: &str) -> Refusal {
+    match fields().field(text) {
+        Err(refusal) => refusal,
+        Ok(_) => panic!("{text} was accepted as {}", read(text)),
+    }
+}
+
+#[test]
+fn fields_as_the_thesis_writes_them() {
+    assert_eq!(
+        read("length(p) - 1 + 0.3*noise(4*p) + 0.15*noise(8*p)"),
+        "(((length(p) - 1) + (0.3*noise((p*4)))) + (0.15*noise((p*8))))"
+    );
+    for (text, graph) in [
+        ("seed", "(length(p) - 2)"),
+        (
+            "seed - noise(base)",
+            "((length(p) - 2) - noise(onto_sphere(p)))",
+        ),
+        ("R*p.z", "(2*p.z)"),
+        ("p.z/2", "(p.z/2)"),
+        ("-p.x", "neg(p.x)"),
+        ("p.x**2", "(p.x*p.x)"),
+        ("p.x**-1", "(1/p.x)"),
+        ("p.x**1.5", "pow(p.x)"),
+        ("four", "4"),
+        ("t*wave", "(t*linear(t))"),
+        ("0*p.x + 1*p.y + 0", "((0*p.x) + p.y)"),
+        ("dot(p, vec(1, 0, t))", "dot(p, vec(1, 0, t))"),
+        (
+            "length((p - vec(1,2,3))/4)",
+            "length(((p - vec(1, 2, 3))*0.25))",
+        ),
+        ("select(p.x, 1, p.y)", "select(p.x, 1, p.y)"),
+        ("clamp(p.x, 0, 1)", "min(max(p.x, 0), 1)"),
+        ("mix(1, 3, 0.5) + p.x", "(2 + p.x)"),
+        ("smoothstep(0, 1, p.z)", "smoothstep(p.z)"),
+        ("p.x.abs()", "abs(p.x)"),
+        ("p.x - -1", "(p.x - -1)"),
+    ] {
+        assert_eq!(read(text), graph, "{text}");
+    }
+}
+
+#[test]
+fn numbers_mean_what_they_mean_on_paper() {
+    for (text, graph) in [
+        ("1/3", "0.3333333333333333"),
+        ("1/3*p.x", "(0.3333333333333333*p.x)"),
+        ("7/2 + 1", "4.5"),
+        ("2**3", "8"),
+        ("2**-1", "0.5"),
+        ("2.0**0.5", "1.4142135623730951"),
+        ("sqrt(4)", "2"),
+        ("max(1, 2.5)", "2.5"),
+        ("-3 % 2", "-1"),
+        ("let x = 1; x += 0.5; x = x/2; x", "0.75"),
+    ] {
+        assert_eq!(read(text), graph, "{text}");
+    }
+}
+
+#[test]
+fn bindings_loops_and_functions() {
+    assert_eq!(
+        read("let f = seed; for i in 0..2 { f += 0.5**i * noise(2**i*p) } f"),
+        "(((length(p) - 2) + noise(p)) + (0.5*noise((p*2))))"
+    );
+    assert_eq!(
+        read("fn ridge(q, k) { (1 - abs(noise(q, k)))**2 } seed - ridge(base, 3)"),
+        "((length(p) - 2) - ((1 - abs(noise(onto_sphere(p))))*(1 - abs(noise(onto_sphere(p))))))"
+    );
+    assert_eq!(
+        read("fn twice(p) { 2*p } length(twice(p.z*p))"),
+        "length(((p*p.z)*2))"
+    );
+    assert_eq!(
+        read("let s = 0; for a in [1, 2, 3] { s += a } s*p.x"),
+        "(6*p.x)"
+    );
+    assert_eq!(read("fn far() { length(p) } far()"), "length(p)");
+    assert_eq!(read("if 1 < 2.5 { p.x } else { p.y }"), "p.x");
+    assert_eq!(
+        read("let i = 0; let f = p.x; while i < 3 { f = f*f; i += 1; } f").len(),
+        45
+    );
+}
+
+#[test]
+fn cascades_take_options() {
+    assert_eq!(read("fbm(p)"), "fbm(p)");
+    assert_eq!(
+        read("altitude2(p, #{basis: \"ridged\", hurst: 0.8, xi: 0.6})"),
+        "altitude2(p)"
+    );
+    assert_eq!(
+        read("ridged_multifractal(p/8, #{offset: 1, gain: 2, octaves: 8})"),
+        "ridged_multifractal((p*0.125))"
+    );
+    assert_eq!(
+        read("turbulence(p, #{key: 3}) + ridged(p)"),
+        "(fbm(p) + fbm(p))"
+    );
+    let refusal = refused("fbm(p, #{octavs: 3})");
+    assert_eq!(refusal.message, "`fbm` has no option `octavs`");
+    assert_eq!(refusal.help.as_deref(), Some("did you mean `octaves`?"));
+    assert_eq!(
+        refused("fbm(p, #{octaves: 99})").message,
+        "`fbm` wants 1 to 48 whole octaves, not 99"
+    );
+    assert_eq!(
+        refused("fbm(p, #{basis: \"rigid\"})").message,
+        "there is no basis `rigid`"
+    );
+    assert_eq!(
+        refused("fbm(p, #{hurst: p.x})").message,
+        "`fbm: hurst` wants a constant number here, not a field"
+    );
+    assert_eq!(
+        refused("noise(p, 0.5)").message,
+        "`noise` wants a key from 0 to 4294967295, not 0.5"
+    );
+}
+
+#[test]
+fn what_rhai_gets_silently_wrong_is_refused_with_a_way_out() {
+    let select = Some("use select(c, a, b): a where c < 0, else b");
+    for (text, message, help) in [
+        ("2^3*p.x", "`^` is not a power", Some("write 2**3")),
+        (
+            "if p.x == 0 { 1 } else { 2 }",
+            "a field cannot be compared with `==`: it differs from point to point",
+            select,
+        ),
+        (
+            "if 0 == p.x { 1 } else { 2 }",
+            "a field cannot be compared with `==`: it differs from point to point",
+            select,
+        ),
+        (
+            "if p.x != p.y { 1 } else { 2 }",
+            "a field cannot be compared with `!=`: it differs from point to point",
+            select,
+        ),
+        (
+            "if p == 1.5 { 1 } else { 2 }",
+            "a field cannot be compared with `==`: it differs from point to point",
+            select,
+        ),
+        (
+            "if p.x < 1 { 1 } else { 2 }",
+            "a field cannot be compared with `<`: it differs from point to point",
+            select,
+        ),
+        (
+            "if \"a\" == p.x { 1 } else { 2 }",
+            "a field cannot be compared with `==`: it differs from point to point",
+            select,
+        ),
+        (
+            "if p.x { 1 } else { 2 }",
+            "a field is neither true nor false: it differs from point to point",
+            select,
+        ),
+        (
+            "while p.x { }",
+            "a field is neither true nor false: it differs from point to point",
+            select,
+        ),
+        ("if !p.x { 1 } else { 2 }", "a `!` has no meaning", None),
+        (
+            "let x = 1; x /= 2; x*p.x",
+            "this would keep whole numbers whole",
+            Some("write x = x / 2, x = x**2"),
+        ),
+        (
+            "switch p.x { 0 => 1, _ => 2 }",
+            "there is no `switch`: a field differs from point to point",
+            select,
+        ),
+        (
+            "1/0",
+            "this divides by zero",
+            Some("check what stands below the `/`"),
+        ),
+        (
+            "2**p.x",
+            "2 cannot be raised to a field",
+            Some("the exponent must be a constant; exp(x * 0.693147) is 2**x"),
+        ),
+    ] {
+        let refusal = refused(text);
+        if message != "a `!` has no meaning" {
+            assert_eq!(refusal.message, message, "{text}");
+            assert_eq!(refusal.help.as_deref(), help, "{text}");
+        }
+        assert!(refusal.position.is_some(), "{text}");
+    }
+}
+
+#[test]
+fn mistakes_have_sentences_and_places() {
+    for (text, message, position) in [
+        ("lenght(p)", "there is no function `lenght`", Some((1, 1))),
+        ("length(q)", "there is no `q`", Some((1, 8))),
+        (
+            "1 +\n  noise(3)",
+            "`noise` wants a vector here, not a number",
+            Some((2, 3)),
+        ),
+        ("noise()", "`noise` does not take (nothing)", Some((1, 1))),
+        ("p.w", "this value has no such part", Some((1, 3))),
+        (
+            "p",
+            "the expression is a vector, but a field is a number at every point",
+            None,
+        ),
+        ("let x = p.x;", "the expression has no value", None),
+        ("\"high\"", "the expression is text, not a field", None),
+        (
+            "p + 1",
+            "a vector `+` a number has no meaning",
+            Some((1, 3)),
+        ),
+        (
+            "p*p",
+            "two vectors cannot be multiplied with `*`",
+            Some((1, 2)),
+        ),
+        ("(p.x", "a `)` is missing", Some((1, 5))),
+        ("p = 3", "`p` cannot be changed", Some((1, 1))),
+        (
+            "noise(p.x)",
+            "`noise` wants a vector here, not a field",
+            Some((1, 1)),
+        ),
+        (
+            "exp(1e9)",
+            "a constant of `constant` is inf; constants must be finite",
+            None,
+        ),
+        (
+            "fn h(q) {\n noise(q.x) }\nh(p)",
+            "`noise` wants a vector here, not a field",
+            Some((2, 2)),
+        ),
+        (
+            "eval(\"1\")",
+            "an expression cannot use `eval`",
+            Some((1, 1)),
+        ),
+        (
+            "import \"x\" as y; 1",
+            "an expression cannot use `import`",
+            Some((1, 1)),
+        ),
+        ("print(1)", "an expression cannot use `print`", Some((1, 1))),
+        ("sleep(1)", "there is no function `sleep`", Some((1, 1))),
+        (
+            "timestamp()",
+            "there is no function `timestamp`",
+            Some((1, 1)),
+        ),
+        (
+            "smoothstep(1, 0, p.x)",
+            "`smoothstep` wants its first edge below its second, not 1",
+            Some((1, 1)),
+        ),
+        (
+            "smoothstep(p.x, 0, p.x)",
+            "`smoothstep` wants a constant number here, not a field",
+            Some((1, 1)),
+        ),
+    ] {
+        let refusal = refused(text);
+        assert_eq!(
+            (refusal.message.as_str(), refusal.position),
+            (message, position),
+            "{text}"
+        );
+    }
+    let plane = Fields::new(Seed::Plane, BTreeMap::new());
+    assert_eq!(
+        plane.field("R").unwrap_err().message,
+        "a plane has no radius `R`"
+    );
+}
+
+#[test]
+fn hostile_scripts_end_soon() {
+    let long_sum = vec!["p.x"; 15_000].join("+");
+    let nested = format!("{}p.x{}", "(".repeat(20_000), ")".repeat(20_000));
+    let negations = format!("{}p.x", "-".repeat(30_000));
+    let many_functions: String = (0..500).map(|i| format!("fn f{i}() {{ 1 }} ")).collect();
+    let many_variables: String = (0..5000).map(|i| format!("let v{i} = 1; ")).collect();
+    let scripts = [
+        "while true { }",
+        "loop { }",
+        "let i = 0; while true { i += 1 }",
+        "let a = []; loop { a += [1] }",
+        "let a = [1]; for i in 0..64 { a = [a, a]; } 1",
+        "let s = \"x\"; for i in 0..64 { s += s; } 1",
+        "let s = \"x\"; loop { s = s + s + s; }",
+        "let m = #{}; for i in 0..100000 { m[\"k\" + i] = m; } 1",
+        "let m = #{a: 1}; for i in 0..64 { m = #{a: m, b: m}; } 1",
+        "fn f(x) { f(x) + f(x) } f(1)",
+        "fn f(x) { if x == 0 { 1 } else { f(x - 1) + f(x - 1) } } f(15) * f(15) * f(15) * f(15) + f(30)",
+        "for i in 0..9223372036854775807 { }",
+        "let f = p.x; for i in 0..100000 { f = f*f + i; } f",
+        "let f = p.x; for i in 0..100000 { f = sin(f); } f",
+        "let f = p.x; for i in 0..100000 { f = noise(i*p) } f",
+        "let n = 1; for i in 0..64 { n = n*1000000 } n",
+        "let n = 1e300; for i in 0..64 { n = n*n } n",
+        "let n = 1e300*1e300; n - n",
+        "9223372036854775807 + 1",
+        "-(-9223372036854775807 - 1)",
+        "p.x[3]",
+        "let x = x; x",
+        &long_sum,
+        &nested,
+        &negations,
+        &many_functions,
+        &many_variables,
+    ];
+    for script in scripts {
+        let begun = Instant::now();
+        let refusal = refused(script);
+        assert!(!refusal.message.is_empty());
+        let shown: String = script.chars().take(60).collect();
+        assert!(begun.elapsed() < Duration::from_secs(5), "{shown}");
+        println!(
+            "{shown:60} {:6.1} ms  {}",
+            begun.elapsed().as_secs_f64() * 1e3,
+            refusal.message
+        );
+    }
+}
+
+#[test]
+fn doubling_sixty_four_times_is_small() {
+    let fields = fields();
+    let script = "let x = p.x; for i in 0..64 { x = x + x } x";
+    fields.field(script).unwrap();
+    assert!(fields.into_graph().nodes().len() < 70);
+}
+
+#[test]
+fn curves_that_are_used_are_known() {
+    let fields = fields();
+    fields.field("wave*p.x").unwrap();
+    assert_eq!(fields.unused_curves(), ["four"]);
+}

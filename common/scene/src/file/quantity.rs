@@ -206,18 +206,23 @@ fn number_end(text: &str) -> usize {
     end
 }
 
-/// The word that was probably meant.
+/// The word that was probably meant: one slip away, or much alike.
 pub(crate) fn nearest<'a>(word: &str, known: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     /// Jaro-Winkler similarity below which two words share nothing.
-    const ALIKE: f64 = 0.7;
+    const ALIKE: f64 = 0.75;
+    let word = word.to_lowercase();
     known
-        .map(|each| {
-            let alike = strsim::jaro_winkler(&word.to_lowercase(), &each.to_lowercase());
-            (each, alike)
+        .filter_map(|each| {
+            let other = each.to_lowercase();
+            let slips = strsim::damerau_levenshtein(&word, &other);
+            let alike = strsim::jaro_winkler(&word, &other);
+            let near = slips == 0
+                || (slips == 1 && word.len() >= 3)
+                || (alike >= ALIKE && word.len() >= 4);
+            near.then_some((slips, alike, each))
         })
-        .filter(|(_, alike)| *alike >= ALIKE)
-        .max_by(|a, b| a.1.total_cmp(&b.1))
-        .map(|(each, _)| each)
+        .min_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)))
+        .map(|(_, _, each)| each)
 }
 
 #[cfg(test)]

@@ -88,6 +88,9 @@ fn finish(reader: &Reader<'_>, mut scene: Description, bound_given: bool) -> Opt
             Err(problem) => report(reader, problem),
         }
     }
+    if reader.has_mistakes() {
+        forget_fields(&mut scene);
+    }
     for problem in rules::problems(&scene) {
         report(reader, problem);
     }
@@ -312,12 +315,17 @@ const ANYWHERE: Bound = Bound::Shell {
     outer: 1.0,
 };
 
-/// What stands for a field that was refused.
+/// What stands for a field until all are read, or for good if it was refused.
 const NOWHERE: NodeId = NodeId(0);
 
-/// A graph that holds [`NOWHERE`] as a number, for looking for more mistakes.
-fn graph_of_mistakes() -> Graph {
+/// Takes all fields out of a scene, in which the rest shall be looked at for more mistakes.
+fn forget_fields(scene: &mut Description) {
     let mut graph = Graph::new();
-    graph.constant(1.0).expect("1 is a constant");
-    graph
+    let surface = &mut scene.surface;
+    surface.field = graph.constant(1.0).expect("1 is a constant");
+    surface.graph = graph;
+    surface.material.variation = None;
+    for layer in &mut surface.material.layers {
+        (layer.cover, layer.height_offset) = (None, None);
+    }
 }

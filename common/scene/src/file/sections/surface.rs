@@ -1,6 +1,8 @@
 //! `[surface]` and `[material]`.
 
-use super::{ANYWHERE, Making, NOWHERE, graph_of_mistakes};
+use field::Graph;
+
+use super::{ANYWHERE, Making, NOWHERE};
 use crate::description::{Bound, Layer, Material, Ramp, Seed, Surface};
 use crate::file::mistake::Mistake;
 use crate::file::quantity::{Dimension, quantity};
@@ -42,7 +44,7 @@ pub(super) fn read(root: &Section<'_>, seed: Seed, making: &mut Making<'_>) -> R
     Read {
         surface: Surface {
             // Replaced by the fields' graph once all are read.
-            graph: graph_of_mistakes(),
+            graph: Graph::new(),
             field: making.field(&section, "field").unwrap_or(NOWHERE),
             seed,
             bound: bound(&section),

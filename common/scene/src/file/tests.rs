@@ -1,0 +1,771 @@
+use std::fs;
+
+use super::*;
+use crate::Curve;
+use crate::description as d;
+
+/// A scene without mistakes that uses most keys.
+const GOOD: &str = r##"
+name = "test"
+key = 3
+
+[film]
+resolution = "64x48"
+images = 10
+fps = 25
+shutter = "20 ms"
+exposure = "1 stops"
+
+[sampling]
+rays = 2
+
+[camera]
+angle = "60 deg"
+
+[camera.great_circle]
+altitude = "30 m"
+speed = "60 km/h"
+heading = "20 deg"
+pitch = { linear = [["0 s", "-10 deg"], ["0.4 s", "0 deg"]] }
+clearance = "2 m"
+
+[surface]
+field = """
+let rise = 2*wave;
+seed - 20 - rise - 3*noise(base/30)
+"""
+
+[surface.sphere]
+radius = "10 km"
+
+[curves]
+wave = { smooth = [[0, 0], [1, 1]] }
+
+[material]
+albedo = "#804020"
+
+[[material.layer]]
+albedo = [0.5, 0.5, 0.5]
+above = ["20 m", "22 m"]
+cover = "noise(p)"
+
+[sun]
+azimuth = "200 deg"
+
+[sky.air]
+visibility = "9 km"
+"##;
+
+fn read(text: &str, overrides: &Overrides) -> Result<Loaded, SceneError> {
+    let source = Source {
+        name: "test.toml".into(),
+        text: text.to_owned(),
+    };
+    parse(source, "stem", Path::new("."), overrides)
+}
+
+/// The mistakes of the good scene after `old` was replaced by `new`, each as the text that it
+/// points to, its message, and its help.
+fn mistakes(old: &str, new: &str) -> Vec<(String, String, String)> {
+    assert!(GOOD.contains(old), "{old}");
+    shown(read(&GOOD.replacen(old, new, 1), &Overrides::default()))
+}
+
+fn shown(result: Result<Loaded, SceneError>) -> Vec<(String, String, String)> {
+    let Err(error) = result else {
+        return Vec::new();
+    };
+    error
+        .mistakes
+        .iter()
+        .map(|mistake| {
+            let text = &error.sources[mistake.place.source].text;
+            (
+                text[mistake.place.span.clone()].to_owned(),
+                mistake.message.clone(),
+                mistake.help.clone().unwrap_or_default(),
+            )
+        })
+        .collect()
+}
+
+#[test]
+fn a_good_scene_is_read_as_it_is_written() {
+    let loaded = read(GOOD, &Overrides::default()).unwrap();
+    assert_eq!(loaded.warnings, []);
+    let scene = loaded.description;
+    assert_eq!((scene.name.as_str(), scene.key), ("test", 3));
+    assert_eq!((scene.film.shutter, scene.film.exposure), (0.02, 1.0));
+    assert_eq!(scene.film.window, scene.film.resolution.rect());
+    let d::Path::GreatCircle(circle) = &scene.camera.path else {
+        panic!("{:?}", scene.camera.path)
+    };
+    assert_eq!((circle.radius, circle.speed), (10_000.0, 60.0 / 3.6));
+    assert_eq!(
+        circle.pitch,
+        Curve::Linear(vec![(0.0, (-10.0f64).to_radians()), (0.4, 0.0)])
+    );
+    let d::Bound::Shell { inner, outer } = scene.surface.bound else {
+        panic!("{:?}", scene.surface.bound)
+    };
+    assert!((10_016.0..10_017.0).contains(&inner) && (10_023.0..10_026.0).contains(&outer));
+    let albedo = scene.surface.material.albedo;
+    assert!((albedo[0] - 0.2158605).abs() < 1e-6, "{albedo:?}");
+    assert_eq!(
+        Description::from_bytes(&scene.to_bytes().unwrap()),
+        Ok(scene)
+    );
+}
+
+#[test]
+fn every_kind_of_mistake_is_said_where_it_is() {
+    let clearance = "the path passes ";
+    for (old, new, span, message, help) in [
+        (
+            "fps = 25",
+            "fsp = 25",
+            "fsp",
+            "there is no key `film.fsp`",
+            "did you mean `fps`?",
+        ),
+        (
+            "[sky.air]",
+            "[skies.air]",
+            "skies",
+            "there is no key `skies`",
+            "did you mean `sky`?",
+        ),
+        (
+            "key = 3",
+            "zzz = 3",
+            "zzz",
+            "there is no key `zzz`",
+            "the keys here are name, key, film",
+        ),
+        (
+            "images = 10",
+            "images = 10\nimages = 11",
+            "images",
+            "this is not TOML: duplicate key",
+            "",
+        ),
+        ("key = 3", "key = ", "", "this is not TOML: ", ""),
+        (
+            "key = 3",
+            "key = 99999999999999999999",
+            "99999999999999999999",
+            "99999999999999999999 is too large a number",
+            "",
+        ),
+        (
+            "key = 3",
+            "key = -1",
+            "-1",
+            "a whole number from 0 to 4294967295 is wanted here",
+            "",
+        ),
+        (
+            "key = 3",
+            "key = 1.5",
+            "1.5",
+            "a whole number from 0 to 4294967295 is wanted here",
+            "",
+        ),
+        (
+            "key = 3",
+            "key = 1979-05-27",
+            "1979-05-27",
+            "a whole number is wanted here, not a date",
+            "",
+        ),
+        (
+            "\"20 ms\"",
+            "\"20 kg\"",
+            "\"20 kg\"",
+            "there is no unit `kg`",
+            "a time is given in s, ms, min",
+        ),
+        (
+            "\"20 ms\"",
+            "\"20 Ms\"",
+            "\"20 Ms\"",
+            "there is no unit `Ms`",
+            "did you mean \"20 ms\"?",
+        ),
+        (
+            "\"20 ms\"",
+            "\"20 m\"",
+            "\"20 m\"",
+            "\"20 m\" is a length, but a time is wanted here",
+            "it is given in s, ms, min",
+        ),
+        (
+            "\"20 ms\"",
+            "true",
+            "true",
+            "a time is wanted here, not true or false",
+            "write it like \"20 ms\"",
+        ),
+        (
+            "\"20 ms\"",
+            "nan",
+            "nan",
+            "a time must be finite, not NaN",
+            "",
+        ),
+        (
+            "\"20 ms\"",
+            "\"40 ms\"",
+            "\"40 ms\"",
+            "the shutter stays open for 0.04 s, but images follow each other after 0.04 s",
+            "half of that is usual: \"20 ms\"",
+        ),
+        (
+            "\"20 ms\"",
+            "-1",
+            "-1",
+            "the shutter cannot stay open for a negative time",
+            "",
+        ),
+        (
+            "fps = 25",
+            "fps = inf",
+            "inf",
+            "a number must be finite, not inf",
+            "",
+        ),
+        (
+            "fps = 25",
+            "fps = 0",
+            "0",
+            "the number of images per second must lie between 0.001 and 10000, but it is 0",
+            "",
+        ),
+        (
+            "fps = 25",
+            "fps = \"25 s\"",
+            "\"25 s\"",
+            "\"25 s\" is a time, but a number is wanted here",
+            "it takes no unit: 25",
+        ),
+        (
+            "\"60 km/h\"",
+            "60",
+            "60",
+            "a speed needs its unit",
+            "write \"60 m/s\" or \"60 km/h\"",
+        ),
+        (
+            "\"60 deg\"",
+            "60",
+            "60",
+            "an angle needs its unit",
+            "write \"60 deg\" or \"60 rad\"",
+        ),
+        (
+            "\"60 deg\"",
+            "\"180 deg\"",
+            "\"180 deg\"",
+            "the angle of view must lie between 0.001 deg and 179 deg, but it is 180 deg",
+            "",
+        ),
+        (
+            "\"60 deg\"",
+            "\"0 deg\"",
+            "\"0 deg\"",
+            "the angle of view must lie between",
+            "",
+        ),
+        (
+            "angle = \"60 deg\"",
+            "angle = \"60 deg\"\nwidth = 3",
+            "width",
+            "[camera.angle] and [camera.width] exclude each other",
+            "keep one of",
+        ),
+        (
+            "\"64x48\"",
+            "\"0x48\"",
+            "\"0x48\"",
+            "an image of 0 × 48 pixels cannot be made",
+            "each side has 1 to 65536 pixels",
+        ),
+        (
+            "\"64x48\"",
+            "\"60000x60000\"",
+            "\"60000x60000\"",
+            "an image of 60000 × 60000 pixels is too large",
+            "",
+        ),
+        (
+            "\"64x48\"",
+            "\"64*48\"",
+            "\"64*48\"",
+            "\"64*48\" is no resolution",
+            "write it like \"800x600\"",
+        ),
+        (
+            "\"64x48\"",
+            "[64, 48, 3]",
+            "[64, 48, 3]",
+            "a list of 2 is wanted here, not of 3",
+            "",
+        ),
+        (
+            "key = 3",
+            "key = 3\nfilm.crop = [0, 0, 1, 1]",
+            "film",
+            "this is not TOML",
+            "",
+        ),
+        (
+            "images = 10",
+            "images = 10\ncrop = [0, 0, 65, 48]",
+            "[0, 0, 65, 48]",
+            "the crop [0, 0, 65, 48] holds no pixel or leaves the image",
+            "it is [x0, y0, x1, y1]",
+        ),
+        (
+            "images = 10",
+            "images = 0",
+            "0",
+            "a scene has 1 to 10000000 images, not 0",
+            "",
+        ),
+        (
+            "rays = 2",
+            "rays = 0",
+            "0",
+            "a pixel cannot have 0 × 0 rays",
+            "rays = N means",
+        ),
+        (
+            "rays = 2",
+            "rays = 65",
+            "65",
+            "a pixel cannot have 65 × 65 rays",
+            "rays = N means",
+        ),
+        (
+            "name = \"test\"",
+            "name = \"a/b\"",
+            "\"a/b\"",
+            "\"a/b\" cannot start the names of frames",
+            "use 1 to 64 letters",
+        ),
+        (
+            "name = \"test\"",
+            "name = 7",
+            "7",
+            "text in quotes is wanted here, not a number",
+            "",
+        ),
+        (
+            "[[0, 0], [1, 1]]",
+            "[]",
+            "[]",
+            "the curve has no keys",
+            "write it like",
+        ),
+        (
+            "[[0, 0], [1, 1]]",
+            "[[1, 0], [1, 1]]",
+            "{ smooth = [[1, 0], [1, 1]] }",
+            "instants of a curve must rise, but 1 s follows 1 s",
+            "",
+        ),
+        (
+            "smooth",
+            "smoot",
+            "smoot",
+            "there is no curve `smoot`",
+            "did you mean `smooth`?",
+        ),
+        (
+            "wave = {",
+            "noise = {",
+            "noise",
+            "a curve cannot be called `noise`",
+            "",
+        ),
+        (
+            "[\"20 m\", \"22 m\"]",
+            "[\"22 m\", \"20 m\"]",
+            "[\"22 m\", \"20 m\"]",
+            "the range is empty: its first end must be below its second",
+            "swap them?",
+        ),
+        (
+            "[\"20 m\", \"22 m\"]",
+            "\"20 m\"",
+            "\"20 m\"",
+            "a list of 2 is wanted here, not text",
+            "write it like [\"25 m\", \"25 m\"]",
+        ),
+        (
+            "\"#804020\"",
+            "\"#80402\"",
+            "\"#80402\"",
+            "\"#80402\" is no colour",
+            "write it like",
+        ),
+        (
+            "\"#804020\"",
+            "[1, 2, 0]",
+            "[1, 2, 0]",
+            "a colour's component must lie between 0 and 1, but it is 2",
+            "",
+        ),
+        (
+            "altitude = \"30 m\"\n",
+            "",
+            "great_circle",
+            "`camera.great_circle.altitude` is missing",
+            "Altitude over that sphere.",
+        ),
+        (
+            "radius = \"10 km\"",
+            "",
+            "sphere",
+            "`surface.sphere.radius` is missing",
+            "Its radius",
+        ),
+        (
+            "radius = \"10 km\"",
+            "radius = \"-1 km\"",
+            "\"-1 km\"",
+            "the radius must lie between",
+            "",
+        ),
+        (
+            "[surface.sphere]\nradius = \"10 km\"",
+            "",
+            "great_circle",
+            "a great circle needs a sphere to fly over",
+            "give it a `radius`",
+        ),
+        (
+            "[surface.sphere]",
+            "[surface.plane]\n[surface.sphere]",
+            "sphere",
+            "[surface.plane] and [surface.sphere] exclude each other",
+            "keep one of",
+        ),
+        (
+            "[sky.air]",
+            "[sky.plain]\n[sky.air]",
+            "air",
+            "[sky.plain] and [sky.air] exclude each other",
+            "keep one of",
+        ),
+        (
+            "noise(base/30)",
+            "noise(bse/30)",
+            "bse",
+            "there is no `bse`",
+            "did you mean `base`?",
+        ),
+        (
+            "noise(base/30)",
+            "nose(base/30)",
+            "nose",
+            "there is no function `nose`",
+            "did you mean `noise`?",
+        ),
+        (
+            "\"noise(p)\"",
+            "\"p\"",
+            "\"p\"",
+            "the expression is a vector, but a field is a number at every point",
+            "take a component",
+        ),
+        (
+            "\"noise(p)\"",
+            "\"1 + \\u0070.x^2\"",
+            "^",
+            "`^` is not a power",
+            "write 2**3",
+        ),
+        (
+            "\"noise(p)\"",
+            "\"if p.x == 0 { 1 } else { 2 }\"",
+            "=",
+            "a field cannot be compared with `==`",
+            "use select",
+        ),
+        (
+            "3*noise(base/30)",
+            "3*p.z",
+            "\"\"\"\nlet rise = 2*wave;\nseed - 20 - rise - 3*p.z\n\"\"\"",
+            "the surface has no end: nothing bounds `(3*p.z)` far away",
+            "let the field grow",
+        ),
+        (
+            "seed - 20",
+            "seed - 200",
+            "\"30 m\"",
+            "the path goes through the ground at frame ",
+            "raise the altitude to at least \"2",
+        ),
+        (
+            "\"30 m\"",
+            "\"23 m\"",
+            "\"23 m\"",
+            clearance,
+            "raise the altitude to at least \"2",
+        ),
+        (
+            "albedo = [0.5, 0.5, 0.5]",
+            "ramp = { file = \"../x.png\", heights = [0, 1] }",
+            "\"../x.png\"",
+            "`../x.png` does not lie below the scene file's folder",
+            "paths are relative",
+        ),
+        (
+            "albedo = [0.5, 0.5, 0.5]",
+            "ramp = { file = \"nowhere.png\", heights = [0, 1] }",
+            "\"nowhere.png\"",
+            "cannot open `nowhere.png`",
+            "paths are relative",
+        ),
+        (
+            "albedo = [0.5, 0.5, 0.5]\n",
+            "",
+            "",
+            "the layer has no colour",
+            "for example",
+        ),
+    ] {
+        let found = mistakes(old, new);
+        assert!(
+            found.iter().any(|(at, text, hint)| {
+                at.contains(span)
+                    && (span.is_empty() || at.len() <= span.len() + 1)
+                    && text.starts_with(message)
+                    && hint.starts_with(help)
+            }),
+            "{new}: {found:#?}"
+        );
+        // A mistake brings no crowd of followers.
+        assert!(found.len() <= 3, "{new}: {found:#?}");
+    }
+}
+
+#[test]
+fn all_mistakes_are_found_at_once_in_the_order_of_the_file() {
+    let text = GOOD
+        .replace("fps = 25", "fps = 0")
+        .replace("rays = 2", "rayz = 2")
+        .replace("\"60 deg\"", "\"60 m\"")
+        .replace("noise(base/30)", "noise(q)")
+        .replace("\"9 km\"", "\"-9 km\"");
+    let error = read(&text, &Overrides::default()).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "test.toml:8:7: the number of images per second must lie between 0.001 and 10000, but it is 0\n\
+         test.toml:13:1: there is no key `sampling.rayz` (did you mean `rays`?)\n\
+         test.toml:16:9: \"60 m\" is a length, but an angle is wanted here (it is given in deg, rad)\n\
+         test.toml:28:28: there is no `q` (the names here are p, t, seed, height, base, R, PI and those of [curves])\n\
+         test.toml:49:14: the visibility must lie between 0.001 m and 1e9 m, but it is -9000 m"
+    );
+}
+
+#[test]
+fn a_scene_without_anything_says_what_it_needs() {
+    let found = shown(read("", &Overrides::default()));
+    let messages: Vec<_> = found
+        .iter()
+        .map(|(_, message, _)| message.as_str())
+        .collect();
+    assert_eq!(messages, ["`camera` is missing", "`surface` is missing"]);
+}
+
+#[test]
+fn fixed_and_spline_cameras_are_checked() {
+    let surface = "[surface]\nplane = {}\nfield = \"seed - noise(base)\"\n";
+    let camera = |camera: &str| {
+        let found = shown(read(
+            &format!("{surface}[camera]\n{camera}"),
+            &Overrides::default(),
+        ));
+        found
+            .into_iter()
+            .map(|(_, message, _)| message)
+            .collect::<Vec<_>>()
+            .join("; ")
+    };
+    assert_eq!(
+        camera("fixed = { eye = [0, -9, 5], target = [0, 0, 0] }"),
+        ""
+    );
+    for (text, message) in [
+        (
+            "fixed = { eye = [0, 0, 5], target = [0, 0, 5] }",
+            "the camera looks at the place where it stands",
+        ),
+        (
+            "fixed = { eye = [0, 0, 5], target = [0, 0, 0] }",
+            "the camera looks along its own up",
+        ),
+        (
+            "fixed = { eye = [0, 0, -5], target = [0, 9, 0] }",
+            "the camera is inside the surface at frame 0",
+        ),
+        (
+            "fixed = { eye = [0, 0, 5] }",
+            "`camera.fixed.target` is missing",
+        ),
+        (
+            "fixed = { eye = [0, 5], target = [0, 9, 0] }",
+            "a list of 3 is wanted here, not of 2",
+        ),
+        (
+            "spline = { keys = [] }",
+            "a spline has 2 to 4096 keys, not 0",
+        ),
+        (
+            "spline = { keys = [{ time = 1, eye = [0, 0, 5], target = [0, 9, 0] }, { time = 1, eye = [0, 0, 6], target = [0, 9, 0] }] }",
+            "instants of keys must rise",
+        ),
+        (
+            "angle = \"50 deg\"",
+            "[camera] needs one of [camera.fixed], [camera.spline], [camera.great_circle]",
+        ),
+        ("fixed = 3", "a table is wanted here, not a number"),
+    ] {
+        assert!(
+            camera(text).starts_with(message),
+            "{text}: {}",
+            camera(text)
+        );
+    }
+}
+
+#[test]
+fn overrides_replace_and_are_blamed_for_their_own_mistakes() {
+    let set = |set: &[&str]| Overrides {
+        set: set.iter().map(|text| (*text).to_owned()).collect(),
+        ..Overrides::default()
+    };
+    let overrides = Overrides {
+        resolution: Some(model::Resolution {
+            width: 32,
+            height: 16,
+        }),
+        rays: Some(5),
+        crop: Some(model::Rect {
+            x0: 0,
+            y0: 0,
+            x1: 8,
+            y1: 8,
+        }),
+        ..set(&[
+            "camera.great_circle.altitude=40 m",
+            "film.fps=30",
+            "material.layer.0.albedo=[1, 0, 0]",
+            "name=other",
+        ])
+    };
+    let scene = read(GOOD, &overrides).unwrap().description;
+    assert_eq!((scene.film.resolution.width, scene.film.window.x1), (32, 8));
+    assert_eq!((scene.sampling.rays, scene.film.fps), (5, 30.0));
+    assert_eq!(scene.surface.material.layers[0].albedo, [1.0, 0.0, 0.0]);
+    assert_eq!(scene.name, "other");
+    for (text, error) in [
+        ("film.fps=0", "--set:1:10: the number of images per second"),
+        ("film.fsp=3", "--set:1:6: there is no key `film.fsp`"),
+        ("film.shutter=3 m", "--set:1:14: \"3 m\" is a length"),
+        ("film", "--set:1:1: `film` sets nothing"),
+        ("film..fps=3", "--set:1:6: `film..fps` is not a key"),
+        (
+            "material.layer.7.albedo=1",
+            "--set:1:16: `7` is no element of a list of 1",
+        ),
+        (
+            "key.x=1",
+            "--set:1:5: `x` cannot be set: what it belongs to is a number",
+        ),
+        (
+            "surface.field=seed - nose(p)",
+            "--set:1:22: there is no function `nose`",
+        ),
+    ] {
+        let message = read(GOOD, &set(&[text])).unwrap_err().to_string();
+        assert!(message.starts_with(error), "{text}: {message}");
+    }
+    let rays = Overrides {
+        rays: Some(0),
+        ..Overrides::default()
+    };
+    let message = read(GOOD, &rays).unwrap_err().to_string();
+    assert!(
+        message.starts_with("--rays:1:1: a pixel cannot have 0 × 0 rays"),
+        "{message}"
+    );
+}
+
+#[test]
+fn unused_curves_are_a_warning() {
+    let loaded = read(&GOOD.replace("2*wave", "2"), &Overrides::default()).unwrap();
+    assert_eq!(loaded.warnings[0].message, "no field uses the curve `wave`");
+}
+
+#[test]
+fn assets_are_read_by_content_and_confined() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let ramp = "ramp = { file = \"ramp.png\", heights = [\"0 m\", \"20 m\"] }";
+    fs::write(&path, GOOD.replace("albedo = [0.5, 0.5, 0.5]", ramp)).unwrap();
+    let error = load(&path, &Overrides::default()).unwrap_err();
+    assert!(
+        error.to_string().contains("cannot open `ramp.png`"),
+        "{error}"
+    );
+    fs::write(folder.path().join("ramp.png"), b"pixels").unwrap();
+    let loaded = load(&path, &Overrides::default()).unwrap();
+    let (asset, bytes) = &loaded.assets[0];
+    assert_eq!((asset.bytes, &bytes[..]), (6, &b"pixels"[..]));
+    assert_eq!(asset.digest.0, *blake3::hash(b"pixels").as_bytes());
+    assert_eq!(loaded.description.assets, [asset.clone()]);
+    #[cfg(unix)]
+    {
+        let outside = tempfile::NamedTempFile::new().unwrap();
+        fs::remove_file(folder.path().join("ramp.png")).unwrap();
+        std::os::unix::fs::symlink(outside.path(), folder.path().join("ramp.png")).unwrap();
+        let error = load(&path, &Overrides::default()).unwrap_err();
+        assert!(error.to_string().contains("leads out of"), "{error}");
+    }
+}
+
+#[test]
+fn files_that_are_no_scenes_say_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let message = |path: &Path| load(path, &Overrides::default()).unwrap_err().to_string();
+    assert!(message(&path).contains("cannot read the file: No such file"));
+    assert!(message(folder.path()).contains("this is not an ordinary file"));
+    fs::write(&path, b"name = \"x\"\n\xff").unwrap();
+    assert!(message(&path).contains("line 2 is not UTF-8"));
+    fs::write(&path, vec![b'#'; 2 << 20]).unwrap();
+    assert!(message(&path).contains("larger than 1 MiB"));
+    fs::write(&path, format!("a = {}", "[".repeat(100_000))).unwrap();
+    assert!(message(&path).contains("this is not TOML"));
+}
+
+#[test]
+fn scenes_in_the_repository_load() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let mut count = 0;
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|ending| ending == "toml") {
+            let loaded =
+                load(&path, &Overrides::default()).unwrap_or_else(|error| panic!("{error}"));
+            assert_eq!(loaded.warnings, [], "{}", path.display());
+            let bytes = loaded.description.to_bytes().unwrap();
+            assert_eq!(Description::from_bytes(&bytes), Ok(loaded.description));
+            count += 1;
+        }
+    }
+    assert!(count >= 12, "{count}");
+}
