@@ -151,11 +151,6 @@ impl Sched {
         out: &mut Vec<Effect>,
     ) {
         self.heard(worker);
-        let refuse = |refusal| Effect::RefuseBlock {
-            worker,
-            block,
-            refusal,
-        };
         let BlockRef {
             attempt,
             image,
@@ -166,60 +161,35 @@ impl Sched {
             attempt,
             rect,
         };
-        let number = self.owned(worker, attempt);
-        let Some(job) = self.jobs.get_mut(&image.job) else {
-            return out.push(refuse(BlockRefusal::AttemptDead));
+        let tile = match self.place_of_block(block) {
+            Ok(Some(tile)) => tile,
+            Ok(None) => return out.push(ack),
+            Err(refusal) => {
+                return out.push(Effect::RefuseBlock {
+                    worker,
+                    block,
+                    refusal,
+                });
+            }
         };
-        let Some(place) = job.place(image.image) else {
-            return out.push(refuse(BlockRefusal::OtherImage));
+        let Some((job, place)) = self.job_and_place(image) else {
+            return;
         };
         let Some(work) = job.work.get_mut(&place) else {
-            let durable = matches!(
-                job.state(place),
-                ImageState::Encoding | ImageState::Encoded { .. }
-            );
-            let dead = refuse(BlockRefusal::AttemptDead);
-            return out.push(if durable && !job.is_over() { ack } else { dead });
+            return;
         };
-        let tile = work
-            .tile_of(rect)
-            .filter(|&tile| is_block_of(work.rect(tile), rect));
-        let Some(tile) = tile else {
-            return out.push(refuse(BlockRefusal::NotABlock));
-        };
-
         let new = work.pixels.add(rect);
+        let image_done = work.pixels.is_complete();
         let state = &mut work.tiles[tile as usize];
         state.missing -= new;
         let tile_done = state.missing == 0;
         if new > 0 {
             state.losses = 0;
         }
-        let image_done = work.pixels.is_complete();
-        let live = number.and_then(|number| self.attempts.get_mut(&number));
-        let leased = live.as_ref().map(|attempt| attempt.leased);
-        let first = live.is_some_and(|attempt| attempt.arrives(rect));
-        let again = rect.area() - new;
         job.tally.pixels_done += new;
         job.tally.blocks_done += u64::from(new > 0);
-        if first && again > 0 {
-            job.tally.blocks_again += u64::from(new == 0);
-            job.tally.pixels_again += again;
-        }
-        if let Some(leased) = leased.filter(|_| first) {
-            // A worker may claim any time; it cannot have taken longer than it had.
-            let elapsed = elapsed.min(self.now - leased);
-            job.time(rect.area(), elapsed);
-            if let Some(worker) = self.workers.get_mut(&worker) {
-                worker.blocks += u64::from(new > 0);
-                worker.pixels += new;
-                worker.render_time = Span(worker.render_time.0.saturating_add(elapsed.0));
-            }
-        }
         out.push(ack);
-        if let Some(number) = number.filter(|_| first) {
-            self.progress(number);
-        }
+        self.credit_attempt(worker, (block, tile), new, elapsed);
         if tile_done {
             self.tile_done(image, tile, out);
         }
@@ -229,6 +199,59 @@ impl Sched {
             out.push(Effect::Encode { image });
         }
         self.job_changed(image.job);
+    }
+
+    /// The tile that a durable block belongs to; `None` where its image has all its pixels.
+    fn place_of_block(&self, block: BlockRef) -> Result<Option<u32>, BlockRefusal> {
+        let job = self.jobs.get(&block.image.job);
+        let job = job.ok_or(BlockRefusal::AttemptDead)?;
+        let place = job.place(block.image.image);
+        let place = place.ok_or(BlockRefusal::OtherImage)?;
+        let Some(work) = job.work.get(&place) else {
+            let state = job.state(place);
+            let durable = matches!(state, ImageState::Encoding | ImageState::Encoded { .. });
+            let wanted = durable && !job.is_over();
+            return wanted.then_some(None).ok_or(BlockRefusal::AttemptDead);
+        };
+        work.tile_of(block.rect)
+            .filter(|&tile| is_block_of(work.rect(tile), block.rect))
+            .map(Some)
+            .ok_or(BlockRefusal::NotABlock)
+    }
+
+    /// Notes with its attempt and worker, where they are there, that a block arrived of
+    /// which `new` pixels were not durable before. One that is sent again counts once.
+    fn credit_attempt(
+        &mut self,
+        id: WorkerId,
+        (block, tile): (BlockRef, u32),
+        new: u64,
+        elapsed: Span,
+    ) {
+        let BlockRef { image, rect, .. } = block;
+        let Some(number) = self.owned(id, block.attempt) else {
+            return;
+        };
+        let Some(attempt) = self.attempts.get_mut(&number) else {
+            return;
+        };
+        let fits = attempt.image == image && attempt.tile == tile;
+        if !fits || !attempt.arrives(rect) {
+            return;
+        }
+        // A worker may claim any time; it cannot have taken longer than it had.
+        let elapsed = elapsed.min(self.now - attempt.leased);
+        if let Some((job, _)) = self.job_and_place(image) {
+            job.tally.blocks_again += u64::from(new == 0);
+            job.tally.pixels_again += rect.area() - new;
+            job.time(rect.area(), elapsed);
+        }
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.blocks += u64::from(new > 0);
+            worker.pixels += new;
+            worker.render_time = Span(worker.render_time.0.saturating_add(elapsed.0));
+        }
+        self.progress(number);
     }
 
     /// Ends the attempts at a tile of which every pixel is durable. One that has
