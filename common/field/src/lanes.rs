@@ -9,11 +9,12 @@ use crate::points::BATCH;
 /// One number per lane.
 pub(crate) type Lanes = [f64; BATCH];
 
-/// Lattice cells and the offsets within them.
+/// Lattice cells, the offsets within them, and room for the hashes of their corners.
 #[derive(Debug)]
 pub(crate) struct Cells {
     cell: [[u32; BATCH]; 3],
     offset: [[f32; BATCH]; 3],
+    corners: [[u32; BATCH]; 8],
 }
 
 impl Cells {
@@ -21,6 +22,7 @@ impl Cells {
         Self {
             cell: [[0; BATCH]; 3],
             offset: [[0.0; BATCH]; 3],
+            corners: [[0; BATCH]; 8],
         }
     }
 
@@ -30,6 +32,29 @@ impl Cells {
         (self.cell[0][i], self.offset[0][i]) = noise::split(x);
         (self.cell[1][i], self.offset[1][i]) = noise::split(y);
         (self.cell[2][i], self.offset[2][i]) = noise::split(z);
+    }
+
+    /// Hashing and interpolating in two loops keeps both within the machine's registers.
+    #[inline(always)]
+    fn hash(&mut self, n: usize, lattice: Lattice) {
+        let [x, y, z] = &self.cell;
+        let [a, b, c, d, e, f, g, h] = &mut self.corners;
+        for i in 0..n {
+            let hashes = noise::corners(lattice, [x[i], y[i], z[i]]);
+            [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]] = hashes;
+        }
+    }
+
+    #[inline(always)]
+    fn corners_at(&self, i: usize) -> [u32; 8] {
+        let [a, b, c, d, e, f, g, h] = &self.corners;
+        [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]
+    }
+
+    #[inline(always)]
+    fn offset_at(&self, i: usize) -> [f32; 3] {
+        let [x, y, z] = &self.offset;
+        [x[i], y[i], z[i]]
     }
 }
 
@@ -70,19 +95,16 @@ pub(crate) fn values<S: Simd>(
     simd: S,
     n: usize,
     lattice: Lattice,
-    cells: &Cells,
+    cells: &mut Cells,
     out: &mut [f32; BATCH],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
             assert!(n <= BATCH);
-            let Cells {
-                cell: [x, y, z],
-                offset: [u, v, w],
-            } = cells;
+            cells.hash(n, lattice);
             for i in 0..n {
-                out[i] = noise::value(lattice, [x[i], y[i], z[i]], [u[i], v[i], w[i]]);
+                out[i] = noise::value(cells.corners_at(i), cells.offset_at(i));
             }
         },
     );
@@ -93,7 +115,7 @@ pub(crate) fn values_gradients<S: Simd>(
     simd: S,
     n: usize,
     lattice: Lattice,
-    cells: &Cells,
+    cells: &mut Cells,
     out: &mut [f32; BATCH],
     gradient: &mut [[f32; BATCH]; 3],
 ) {
@@ -101,14 +123,18 @@ pub(crate) fn values_gradients<S: Simd>(
         #[inline(always)]
         || {
             assert!(n <= BATCH);
-            let Cells {
-                cell: [x, y, z],
-                offset: [u, v, w],
-            } = cells;
+            cells.hash(n, lattice);
             let [gx, gy, gz] = gradient;
             for i in 0..n {
-                (out[i], [gx[i], gy[i], gz[i]]) =
-                    noise::value_gradient(lattice, [x[i], y[i], z[i]], [u[i], v[i], w[i]]);
+                [gx[i], gy[i], gz[i]] =
+                    noise::mean_gradient(cells.corners_at(i), cells.offset_at(i));
+            }
+            for i in 0..n {
+                let (value, [x, y, z]) = noise::value_bend(cells.corners_at(i), cells.offset_at(i));
+                out[i] = value;
+                gx[i] += x;
+                gy[i] += y;
+                gz[i] += z;
             }
         },
     );

@@ -39,14 +39,17 @@ impl Lattice {
 /// f_N at `p` over the lattice of `key`, thesis eq. (4.9).
 pub fn noise(key: u32, p: [f64; 3]) -> f64 {
     let [(x, u), (y, v), (z, w)] = p.map(split);
-    f64::from(value(Lattice::new(key), [x, y, z], [u, v, w]))
+    f64::from(value(corners(Lattice::new(key), [x, y, z]), [u, v, w]))
 }
 
 /// f_N and its gradient at `p`, thesis eqs. (4.9), (4.10a).
 pub fn noise_gradient(key: u32, p: [f64; 3]) -> (f64, [f64; 3]) {
     let [(x, u), (y, v), (z, w)] = p.map(split);
-    let (value, gradient) = value_gradient(Lattice::new(key), [x, y, z], [u, v, w]);
-    (f64::from(value), gradient.map(f64::from))
+    let h = corners(Lattice::new(key), [x, y, z]);
+    let (value, bend) = value_bend(h, [u, v, w]);
+    let mean = mean_gradient(h, [u, v, w]);
+    let gradient = [0, 1, 2].map(|i| f64::from(mean[i] + bend[i]));
+    (f64::from(value), gradient)
 }
 
 /// The lattice cell of a coordinate, modulo 2³², and the offset within it, in [0, 1].
@@ -96,22 +99,6 @@ fn kernel(hash: u32, x: f32, y: f32, z: f32) -> f32 {
     flip(a, hash << 13) + flip(b, hash << 14)
 }
 
-/// The gradient of that lattice point.
-#[inline(always)]
-fn direction(hash: u32) -> [f32; 3] {
-    let axis = hash.cast_signed();
-    let a = flip(1.0, hash << 13);
-    let b = flip(1.0, hash << 14);
-    let first = axis < FIRST;
-    let third = axis >= THIRD;
-    let y = if third { b } else { 0.0 };
-    [
-        if first { 0.0 } else { a },
-        if first { a } else { y },
-        if third { 0.0 } else { b },
-    ]
-}
-
 /// `value` with its sign turned where the top bit of `sign` is set.
 #[inline(always)]
 fn flip(value: f32, sign: u32) -> f32 {
@@ -123,14 +110,6 @@ fn lerp(t: f32, a: f32, b: f32) -> f32 {
     a + t * (b - a)
 }
 
-/// One component of the corners' gradients, interpolated.
-#[inline(always)]
-fn mean([u, v, w]: [f32; 3], g: &[[f32; 3]; 8], i: usize) -> f32 {
-    let near = lerp(v, lerp(u, g[0][i], g[1][i]), lerp(u, g[2][i], g[3][i]));
-    let far = lerp(v, lerp(u, g[4][i], g[5][i]), lerp(u, g[6][i], g[7][i]));
-    lerp(w, near, far)
-}
-
 /// The hash of a cell's corner, good in its upper fifteen bits.
 #[inline(always)]
 fn corner(row: u32, z: u32) -> u32 {
@@ -139,32 +118,29 @@ fn corner(row: u32, z: u32) -> u32 {
 
 /// The hashes of a cell's eight corners; x runs fastest.
 #[inline(always)]
-fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
+pub(crate) fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
     let x0 = hash::absorb(lattice.0, x);
     let x1 = hash::absorb(lattice.0, x.wrapping_add(1));
     let (y1, z1) = (y.wrapping_add(1), z.wrapping_add(1));
-    let rows = [
-        hash::absorb(x0, y),
-        hash::absorb(x1, y),
-        hash::absorb(x0, y1),
-        hash::absorb(x1, y1),
-    ];
+    let a = hash::absorb(x0, y);
+    let b = hash::absorb(x1, y);
+    let c = hash::absorb(x0, y1);
+    let d = hash::absorb(x1, y1);
     [
-        corner(rows[0], z),
-        corner(rows[1], z),
-        corner(rows[2], z),
-        corner(rows[3], z),
-        corner(rows[0], z1),
-        corner(rows[1], z1),
-        corner(rows[2], z1),
-        corner(rows[3], z1),
+        corner(a, z),
+        corner(b, z),
+        corner(c, z),
+        corner(d, z),
+        corner(a, z1),
+        corner(b, z1),
+        corner(c, z1),
+        corner(d, z1),
     ]
 }
 
-/// The noise at an offset within a cell.
+/// The noise at an offset within the cell of these corners.
 #[inline(always)]
-pub(crate) fn value(lattice: Lattice, cell: [u32; 3], [x, y, z]: [f32; 3]) -> f32 {
-    let h = corners(lattice, cell);
+pub(crate) fn value(h: [u32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
     let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
     let a = lerp(u, kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
@@ -174,54 +150,60 @@ pub(crate) fn value(lattice: Lattice, cell: [u32; 3], [x, y, z]: [f32; 3]) -> f3
     lerp(w, lerp(v, a, b), lerp(v, c, d))
 }
 
-/// The noise and its gradient at an offset within a cell. The value is that of [`value`] to the bit.
+/// The noise as [`value`] gives it, to the bit, and the second part of its gradient, thesis eq. (4.10a):
+/// what comes of the kernels' profiles.
 #[inline(always)]
-pub(crate) fn value_gradient(
-    lattice: Lattice,
-    cell: [u32; 3],
-    [x, y, z]: [f32; 3],
-) -> (f32, [f32; 3]) {
-    let h = corners(lattice, cell);
+pub(crate) fn value_bend(h: [u32; 8], [x, y, z]: [f32; 3]) -> (f32, [f32; 3]) {
     let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
     let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
-    let k = [
-        kernel(h[0], x, y, z),
-        kernel(h[1], x1, y, z),
-        kernel(h[2], x, y1, z),
-        kernel(h[3], x1, y1, z),
-        kernel(h[4], x, y, z1),
-        kernel(h[5], x1, y, z1),
-        kernel(h[6], x, y1, z1),
-        kernel(h[7], x1, y1, z1),
-    ];
-    let a = lerp(u, k[0], k[1]);
-    let b = lerp(u, k[2], k[3]);
-    let c = lerp(u, k[4], k[5]);
-    let d = lerp(u, k[6], k[7]);
-    let (e, f) = (lerp(v, a, b), lerp(v, c, d));
-    let along_x = lerp(
-        w,
-        lerp(v, k[1] - k[0], k[3] - k[2]),
-        lerp(v, k[5] - k[4], k[7] - k[6]),
+    let (a0, a1) = (kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
+    let (b0, b1) = (kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
+    let (c0, c1) = (kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
+    let (d0, d1) = (kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
+    let (a, b, c, d) = (
+        lerp(u, a0, a1),
+        lerp(u, b0, b1),
+        lerp(u, c0, c1),
+        lerp(u, d0, d1),
     );
+    let (near, far) = (lerp(v, a, b), lerp(v, c, d));
+    let along_x = lerp(w, lerp(v, a1 - a0, b1 - b0), lerp(v, c1 - c0, d1 - d0));
     let along_y = lerp(w, b - a, d - c);
-    let along_z = f - e;
-    let g = [
-        direction(h[0]),
-        direction(h[1]),
-        direction(h[2]),
-        direction(h[3]),
-        direction(h[4]),
-        direction(h[5]),
-        direction(h[6]),
-        direction(h[7]),
+    let bend = [
+        fade_slope(x, x1) * along_x,
+        fade_slope(y, y1) * along_y,
+        fade_slope(z, z1) * (far - near),
     ];
-    let gradient = [
-        mean([u, v, w], &g, 0) + fade_slope(x, x1) * along_x,
-        mean([u, v, w], &g, 1) + fade_slope(y, y1) * along_y,
-        mean([u, v, w], &g, 2) + fade_slope(z, z1) * along_z,
-    ];
-    (lerp(w, e, f), gradient)
+    (lerp(w, near, far), bend)
+}
+
+/// The first part of the noise's gradient: the corners' own gradients, weighted.
+#[inline(always)]
+pub(crate) fn mean_gradient(h: [u32; 8], [x, y, z]: [f32; 3]) -> [f32; 3] {
+    let (u, v, w) = (fade(x, x - 1.0), fade(y, y - 1.0), fade(z, z - 1.0));
+    let (u0, v0, w0) = (1.0 - u, 1.0 - v, 1.0 - w);
+    let (a, b, c, d) = (u0 * v0, u * v0, u0 * v, u * v);
+    let mut sum = [0.0; 3];
+    add_gradient(&mut sum, h[0], a * w0);
+    add_gradient(&mut sum, h[1], b * w0);
+    add_gradient(&mut sum, h[2], c * w0);
+    add_gradient(&mut sum, h[3], d * w0);
+    add_gradient(&mut sum, h[4], a * w);
+    add_gradient(&mut sum, h[5], b * w);
+    add_gradient(&mut sum, h[6], c * w);
+    add_gradient(&mut sum, h[7], d * w);
+    sum
+}
+
+/// Adds `weight` times the gradient that [`kernel`] multiplies with.
+#[inline(always)]
+fn add_gradient(sum: &mut [f32; 3], hash: u32, weight: f32) {
+    let axis = hash.cast_signed();
+    let (a, b) = (flip(weight, hash << 13), flip(weight, hash << 14));
+    let y = if axis < THIRD { 0.0 } else { b };
+    sum[0] += if axis < FIRST { 0.0 } else { a };
+    sum[1] += if axis < FIRST { a } else { y };
+    sum[2] += if axis < THIRD { b } else { 0.0 };
 }
 
 #[cfg(test)]

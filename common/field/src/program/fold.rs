@@ -59,7 +59,10 @@ pub(crate) fn constant(act: &Act, args: &[Option<Value>]) -> Option<Value> {
         Act::Select => Value::Scalar(select(s(0), s(1), s(2))),
         Act::Noise(lattice) => {
             let [(x, u), (y, v), (z, w)] = v(0).map(noise::split);
-            Value::Scalar(f64::from(noise::value(*lattice, [x, y, z], [u, v, w])))
+            Value::Scalar(f64::from(noise::value(
+                noise::corners(*lattice, [x, y, z]),
+                [u, v, w],
+            )))
         }
     })
 }

@@ -249,7 +249,7 @@ impl Octaves {
             }
             noises += live;
             lanes::place(simd, n, octave, at, &mut self.cells);
-            lanes::values(simd, n, octave.lattice, &self.cells, &mut self.noise);
+            lanes::values(simd, n, octave.lattice, &mut self.cells, &mut self.noise);
             let place = Place {
                 n,
                 i: cascade::index(i),

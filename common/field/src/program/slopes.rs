@@ -299,7 +299,7 @@ impl Octaves {
                 simd,
                 n,
                 octave.lattice,
-                &self.cells,
+                &mut self.cells,
                 &mut self.noise,
                 &mut self.gradient,
             );
