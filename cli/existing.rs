@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{Format, Formats, frame_name};
+use image::{Format, FrameInfo, Formats, frame_name};
 use model::{Digest, ImageNumber};
 
 use crate::error::Error;
@@ -34,8 +34,9 @@ pub(crate) struct Wanted<'a> {
 /// What is left to do.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct Survey {
-    /// Frames that are there, every file whole and of the same scene and renderer.
-    pub(crate) kept: Vec<ImageNumber>,
+    /// Frames that are there, every file whole and of the same scene and renderer, with the
+    /// digests of their films as they say them.
+    pub(crate) kept: Vec<(ImageNumber, Option<Digest>)>,
     /// Frames to make.
     pub(crate) missing: Vec<ImageNumber>,
 }
@@ -60,7 +61,7 @@ pub(crate) fn survey(wanted: &Wanted<'_>, existing: Existing) -> Result<Survey, 
                     .next("choose another folder with `-o`, or say `--existing skip` or `replace`"));
             }
             (Existing::Skip, Some(_)) => match wanted.look(&files)? {
-                Found::Whole => survey.kept.push(image),
+                Found::Whole(film) => survey.kept.push((image, film)),
                 Found::InPart => survey.missing.push(image),
             },
         }
@@ -69,8 +70,8 @@ pub(crate) fn survey(wanted: &Wanted<'_>, existing: Existing) -> Result<Survey, 
 }
 
 enum Found {
-    /// Every file is there.
-    Whole,
+    /// Every file is there; one of them says the digest of the film.
+    Whole(Option<Digest>),
     /// Some files are missing; those there are the same frame's.
     InPart,
 }
@@ -83,13 +84,13 @@ impl Wanted<'_> {
 
     /// Whether the files of a frame are the ones wanted.
     fn look(&self, files: &[(Format, PathBuf)]) -> Result<Found, Error> {
-        let mut vouched = false;
+        let mut vouched = None;
         for (format, path) in files.iter().filter(|(_, path)| path.exists()) {
-            match self.stranger(path)? {
-                None => vouched = true,
+            match self.own(path)? {
+                Ok(film) => vouched = vouched.or(Some(film)),
                 // A PPM says nothing about itself; the files beside it speak for it.
-                Some(_) if *format == Format::Ppm && vouched => {}
-                Some(why) => {
+                Err(_) if *format == Format::Ppm && vouched.is_some() => {}
+                Err(why) => {
                     return Err(Error::failed(format!(
                         "`{}` is there already, and {why}",
                         path.display()
@@ -99,43 +100,49 @@ impl Wanted<'_> {
             }
         }
         let whole = files.iter().all(|(_, path)| path.exists());
-        Ok(if whole { Found::Whole } else { Found::InPart })
+        Ok(if whole {
+            Found::Whole(vouched.flatten())
+        } else {
+            Found::InPart
+        })
     }
 
-    /// Why a file is not the one wanted.
-    fn stranger(&self, path: &Path) -> Result<Option<String>, Error> {
+    /// The film digest of a file that is the one wanted, or why it is not.
+    fn own(&self, path: &Path) -> Result<Result<Option<Digest>, String>, Error> {
         let info = match image::info(path) {
             Ok(info) => info,
             Err(error @ image::ImageError::Io { .. }) => {
                 return Err(Error::failed("cannot look at a frame that is there").because(error));
             }
-            Err(error) => return Ok(Some(format!("it is no frame that can be read: {error}"))),
+            Err(error) => return Ok(Err(format!("it is no frame that can be read: {error}"))),
         };
-        let said = |name: &str| {
-            let found = info.metadata.iter().find(|(key, _)| key == name);
-            found.map(|(_, value)| value.as_str())
-        };
-        let (Some(scene), Some(revision)) = (said(SCENE_DIGEST), said(REVISION)) else {
-            return Ok(Some("it does not say which scene it shows".to_owned()));
+        let (Some(scene), Some(revision)) = (said(&info, SCENE_DIGEST), said(&info, REVISION))
+        else {
+            return Ok(Err("it does not say which scene it shows".to_owned()));
         };
         if scene != self.scene.to_string() {
-            return Ok(Some("it shows another scene, or other settings".to_owned()));
+            return Ok(Err("it shows another scene, or other settings".to_owned()));
         }
         if revision != self.revision.to_string() {
-            return Ok(Some(format!(
+            return Ok(Err(format!(
                 "another revision of the renderer made it ({revision}, this one is {})",
                 self.revision
             )));
         }
-        Ok(None)
+        Ok(Ok(said(&info, FILM_DIGEST).and_then(|digest| digest.parse().ok())))
     }
+}
+
+/// What a frame says about itself under a name.
+pub(crate) fn said<'a>(info: &'a FrameInfo, name: &str) -> Option<&'a str> {
+    let found = info.metadata.iter().find(|(key, _)| key == name);
+    found.map(|(_, value)| value.as_str())
 }
 
 /// The film digest that a frame says it has.
 pub(crate) fn film_digest(path: &Path) -> Option<Digest> {
     let info = image::info(path).ok()?;
-    let (_, digest) = info.metadata.iter().find(|(key, _)| key == FILM_DIGEST)?;
-    digest.parse().ok()
+    said(&info, FILM_DIGEST)?.parse().ok()
 }
 
 /// What the names of a scene's files begin with: the letters, digits, `-` and `_` of its
@@ -213,12 +220,15 @@ mod tests {
     fn frames_of_the_same_scene_are_kept_and_others_stand_in_the_way() {
         let (ours, theirs) = (Digest([1; 32]), Digest([2; 32]));
         let folder = tempfile::tempdir().unwrap();
-        let numbers = |survey: &[ImageNumber]| survey.iter().map(|n| n.0).collect::<Vec<_>>();
+        let numbers = |images: &[ImageNumber]| images.iter().map(|n| n.0).collect::<Vec<_>>();
 
         frame(folder.path(), 0, ours, "exr,png,ppm");
         frame(folder.path(), 1, ours, "exr");
         let kept = look(folder.path(), ours, 1, Existing::Skip).unwrap();
-        assert_eq!((numbers(&kept.kept), numbers(&kept.missing)), (vec![0], vec![1, 2]));
+        let film = film_digest(&folder.path().join("s_0000.exr"));
+        assert!(film.is_some());
+        assert_eq!(kept.kept, [(ImageNumber(0), film)]);
+        assert_eq!(numbers(&kept.missing), [1, 2]);
         let all = look(folder.path(), ours, 1, Existing::Replace).unwrap();
         assert_eq!(numbers(&all.missing), [0, 1, 2]);
         assert!(look(folder.path(), ours, 1, Existing::Fail).is_err());
@@ -230,7 +240,6 @@ mod tests {
         std::fs::write(folder.path().join("s_0002.exr"), "no image").unwrap();
         let broken = look(folder.path(), ours, 1, Existing::Skip).unwrap_err();
         assert!(broken.to_string().contains("no frame that can be read"), "{broken}");
-        assert!(film_digest(&folder.path().join("s_0000.exr")).is_some());
     }
 
     #[test]

@@ -210,10 +210,7 @@ impl From<FrameInfo> for Info {
                 })
                 .collect(),
         };
-        let said = |name: &str| {
-            let found = info.metadata.iter().find(|(key, _)| key == name);
-            found.map(|(_, value)| value.clone())
-        };
+        let said = |name: &str| existing::said(&info, name).map(str::to_owned);
         Self {
             scene_digest: said(existing::SCENE_DIGEST),
             film_digest: said(existing::FILM_DIGEST),

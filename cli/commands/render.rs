@@ -6,15 +6,15 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Args;
-use image::{Format, FrameMetadata, Opened, frame_name};
-use model::{ImageNumber, Resolution};
+use image::{Format, FrameMetadata, Opened};
+use model::{Digest, ImageNumber, Resolution};
 use render::{Counts, EvalSettings, SimdLevel};
 use serde::Serialize;
 
 use super::job::make_folder;
 use crate::daemon::software;
 use crate::error::{Ending, Error};
-use crate::existing::{Survey, Wanted, film_digest, stem, survey};
+use crate::existing::{Survey, Wanted, stem, survey};
 use crate::load::Scene;
 use crate::movie::{self, Movie};
 use crate::options::{Context, FileOptions, FrameOptions, SceneOptions};
@@ -157,7 +157,7 @@ pub(crate) fn run(context: &Context, options: &Render) -> Result<Ending, Error> 
     let report = RenderReport {
         scene_digest: scene.digest.to_string(),
         revision: render::REVISION,
-        frames: frames(&wanted, &outcome),
+        frames: frames(&wanted, &kept, &outcome),
         frames_rendered: outcome.frames.len(),
         frames_kept: kept.len(),
         blocks_rendered: outcome.blocks,
@@ -260,26 +260,27 @@ fn found(image: ImageNumber, opened: Opened, window: u64) -> String {
 }
 
 /// Every frame asked for, rendered now or kept.
-fn frames(wanted: &Wanted<'_>, outcome: &Outcome) -> Vec<Frame> {
-    let frame = |image: &ImageNumber| {
-        let now = outcome.frames.iter().find(|(done, _)| done == image);
-        let files: Vec<PathBuf> = wanted
+fn frames(
+    wanted: &Wanted<'_>,
+    kept: &[(ImageNumber, Option<Digest>)],
+    outcome: &Outcome,
+) -> Vec<Frame> {
+    let rendered = outcome.frames.iter();
+    let rendered = rendered.map(|(image, frame)| (*image, Some(frame.film_digest), false));
+    let kept = kept.iter().map(|(image, film)| (*image, *film, true));
+    let mut frames: Vec<_> = rendered.chain(kept).collect();
+    frames.sort_by_key(|(image, ..)| *image);
+    let frames = frames.into_iter().map(|(image, film, kept)| Frame {
+        frame: image.0,
+        film_digest: film.map(|digest| digest.to_string()),
+        files: wanted
             .formats
             .iter()
-            .map(|format| wanted.folder.join(frame_name(wanted.stem, *image, format)))
-            .collect();
-        let digest = match now {
-            Some((_, frame)) => Some(frame.film_digest),
-            None => files.iter().find_map(|file| film_digest(file)),
-        };
-        Frame {
-            frame: image.0,
-            film_digest: digest.map(|digest| digest.to_string()),
-            files,
-            kept: now.is_none(),
-        }
-    };
-    wanted.images.iter().map(frame).collect()
+            .map(|format| wanted.path(image, format))
+            .collect(),
+        kept,
+    });
+    frames.collect()
 }
 
 /// Counts by name.

@@ -148,7 +148,7 @@ impl Order<'_> {
         let stem = self.stem();
         let survey = self.survey(&images, &stem)?;
         let mut report = SubmitReport::new(&self);
-        report.kept = survey.kept.iter().flat_map(|image| self.files(*image, &stem)).collect();
+        report.kept = survey.kept.iter().flat_map(|(image, _)| self.files(*image, &stem)).collect();
         match span(&survey.missing, all.step()) {
             None => {
                 let folder = self.target.map_or(Path::new("."), |target| target.folder);

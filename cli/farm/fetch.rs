@@ -72,6 +72,7 @@ impl Fetcher<'_> {
             ))
         })?;
         let path = self.folder.join(name);
+        let part = self.folder.join(format!(".{name}.part"));
         if path.exists() {
             match self.existing {
                 Existing::Replace => {}
@@ -79,10 +80,9 @@ impl Fetcher<'_> {
                     return Err(Error::failed(format!("`{}` is there already", path.display()))
                         .next("choose another folder with `-o`, or say `--existing skip` or `replace`"));
                 }
-                Existing::Skip => return self.keep(image, file, path).await,
+                Existing::Skip => return self.keep(image, file, path, &part).await,
             }
         }
-        let part = self.folder.join(format!(".{name}.part"));
         self.download(image, file, &part).await?;
         put(&part, &path)?;
         Ok(Fetched::New(path))
@@ -94,15 +94,15 @@ impl Fetcher<'_> {
         image: &ImageStatus,
         file: &FrameFile,
         path: PathBuf,
+        part: &Path,
     ) -> Result<Fetched, Error> {
         let same = match existing::film_digest(&path) {
             Some(digest) => digest.0.as_slice() == image.film_digest,
             // A PPM names no film: it is compared whole.
             None => {
-                let part = path.with_extension("part");
-                self.download(image, file, &part).await?;
-                let same = fs::read(&part).ok() == fs::read(&path).ok();
-                let _ = fs::remove_file(&part);
+                self.download(image, file, part).await?;
+                let same = fs::read(part).ok() == fs::read(&path).ok();
+                let _ = fs::remove_file(part);
                 same
             }
         };
