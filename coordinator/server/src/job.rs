@@ -18,11 +18,24 @@ const COUNTERS_MAX: usize = 64;
 /// Changes that a watcher may be behind before it gets a fresh snapshot.
 const WATCHER_BEHIND_MAX: usize = 64;
 
-/// Most images in one message.
-pub(crate) const IMAGES_PER_MESSAGE: usize = 1_000;
+/// Most images in one message: even if each failed for a long reason, they fit.
+pub(crate) const IMAGES_PER_MESSAGE: usize = 400;
+
+/// Most new lines of a log in one message; older ones are only in the log itself.
+const LINES_PER_MESSAGE: usize = 400;
+
+/// Most bytes of one line of a log.
+const LINE_BYTES_MAX: usize = 1_000;
 
 /// Sums by name.
 pub(crate) type Counters = BTreeMap<String, u64>;
+
+/// Whether something is counted, or taken back.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Sign {
+    Plus,
+    Minus,
+}
 
 /// One job.
 #[derive(Debug)]
@@ -80,15 +93,22 @@ impl Job {
         self.plan.formats
     }
 
-    /// Adds what was counted while a block was rendered that is now durable.
-    pub(crate) fn count(&mut self, image: ImageNumber, counters: &[(String, u64)]) {
-        let of_image = self.image_counters.entry(image).or_default();
-        for sums in [of_image, &mut self.counters] {
+    /// Adds what was counted while a block was rendered that is now durable, or takes it back.
+    pub(crate) fn count(&mut self, image: ImageNumber, counters: &[(String, u64)], sign: Sign) {
+        let of_image = match sign {
+            Sign::Plus => Some(self.image_counters.entry(image).or_default()),
+            Sign::Minus => self.image_counters.get_mut(&image),
+        };
+        for sums in of_image.into_iter().chain([&mut self.counters]) {
+            let full = sums.len() + counters.len() > COUNTERS_MAX;
             for (name, value) in counters {
-                if let Some(sum) = sums.get_mut(name) {
-                    *sum = sum.saturating_add(*value);
-                } else if sums.len() < COUNTERS_MAX {
-                    sums.insert(name.clone(), *value);
+                match (sums.get_mut(name), sign) {
+                    (Some(sum), Sign::Plus) => *sum = sum.saturating_add(*value),
+                    (Some(sum), Sign::Minus) => *sum = sum.saturating_sub(*value),
+                    (None, Sign::Plus) if !full => {
+                        sums.insert(name.clone(), *value);
+                    }
+                    (None, _) => {}
                 }
             }
         }
@@ -105,9 +125,10 @@ impl Job {
     }
 
     /// Adds a line to its log.
-    pub(crate) fn say(&mut self, unix_ms: u64, text: String) {
+    pub(crate) fn say(&mut self, unix_ms: u64, text: &str) {
+        let text = wire::convert::sentence(text, LINE_BYTES_MAX);
         let line = proto::LogLine { unix_ms, text };
-        if self.has_watchers() {
+        if self.has_watchers() && self.new_lines.len() < LINES_PER_MESSAGE {
             self.new_lines.push(line.clone());
         }
         self.log.push(line);

@@ -169,6 +169,7 @@ async fn follow(
     mut changes: broadcast::Receiver<Arc<proto::JobUpdate>>,
     sender: &mpsc::Sender<Result<proto::JobUpdate, Status>>,
 ) -> Followed {
+    let mut over = false;
     loop {
         let change = tokio::select! {
             change = changes.recv() => change,
@@ -176,14 +177,30 @@ async fn follow(
         };
         match change {
             Ok(update) => {
+                over = is_over(&update);
                 if sender.send(Ok((*update).clone())).await.is_err() {
                     return Followed::ToItsEnd;
                 }
             }
             Err(broadcast::error::RecvError::Lagged(_)) => return Followed::FellBehind,
-            Err(broadcast::error::RecvError::Closed) => return Followed::ToItsEnd,
+            Err(broadcast::error::RecvError::Closed) => {
+                if !over {
+                    let _ = sender.send(Err(super::stopping().into())).await;
+                }
+                return Followed::ToItsEnd;
+            }
         }
     }
+}
+
+/// Whether an update says that the job is over.
+fn is_over(update: &proto::JobUpdate) -> bool {
+    use proto::JobState::{Cancelled, Done, Failed};
+    let summary = match &update.update {
+        Some(proto::job_update::Update::Delta(delta)) => delta.summary.as_ref(),
+        _ => None,
+    };
+    summary.is_some_and(|summary| matches!(summary.state(), Done | Failed | Cancelled))
 }
 
 async fn send_parts(

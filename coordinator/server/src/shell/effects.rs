@@ -196,7 +196,8 @@ impl Shell {
         let waiting = self
             .submitting
             .take_if(|(waiting, _, _)| *waiting == submission);
-        if let Some((_, _, reply)) = waiting {
+        if let Some((_, new, reply)) = waiting {
+            drop(new);
             let _ = reply.send(answer);
         }
     }
@@ -269,6 +270,14 @@ impl Shell {
         }
         self.say(id, format!("the job is {words}"));
         self.clear_job(id);
+        if let Some(job) = self.jobs.get_mut(id) {
+            // No event of its own told of images that were never begun.
+            for image in self.sched.images(id) {
+                if !matches!(image.state, sched::ImageState::Encoded { .. }) {
+                    job.touch(image.image);
+                }
+            }
+        }
         self.jobs.touch(id);
     }
 
@@ -346,7 +355,7 @@ impl Shell {
     pub(super) fn say(&mut self, id: JobId, text: String) {
         let now = self.unix_ms_now();
         if let Some(job) = self.jobs.get_mut(id) {
-            job.say(now, text);
+            job.say(now, &text);
             self.jobs.touch(id);
         }
     }

@@ -1,6 +1,6 @@
 //! From inputs to events.
 
-use model::WorkerId;
+use model::{ImageRef, JobId, WorkerId};
 use sched::{Event, LinkId, Verdict};
 use wire::proto::{self, ErrorKind, deliver_down};
 use wire::{Failure, convert};
@@ -8,6 +8,7 @@ use wire::{Failure, convert};
 use super::{Next, Shell};
 use crate::inbox::NewJob;
 use crate::input::{Arrived, Greeting, Input, Link, Reply};
+use crate::job::Sign;
 use crate::storage::{Encoded, Refusal, Stored};
 use crate::worker::Worker;
 
@@ -102,16 +103,18 @@ impl Shell {
         let Some(worker) = self.workers.get_mut(&id) else {
             return;
         };
-        if !worker.is_control(link) {
-            return;
-        }
+        let newest = worker.is_control(link);
         match &event {
+            // Told even of a link that was cut here; the scheduler ignores one that was replaced.
             Event::LinkClosed { .. } => {
-                worker.control = None;
-                worker.delivery = None;
+                if newest {
+                    worker.control = None;
+                    worker.delivery = None;
+                }
                 tracing::info!(worker = %id, "a worker's link closed");
                 self.tell_jobs_of_closed_link(id);
             }
+            _ if !newest => return,
             Event::TileFailed {
                 attempt, reason, ..
             } => {
@@ -182,17 +185,18 @@ impl Shell {
         } = arrived;
         match result {
             Ok(()) => {
-                let wanted = self.sched.image(block.image);
-                let known = wanted.is_some_and(|image| image.state == sched::ImageState::Rendering);
-                if let Some(job) = self.jobs.get_mut(block.image.job).filter(|_| known) {
-                    job.count(block.image.image, &counters);
-                }
+                self.count(block.image, &counters, Sign::Plus);
+                let before = self.blocks_done(block.image.job);
                 self.jobs.touch_image(block.image);
                 self.feed(Event::BlockStored {
                     worker,
                     block,
                     elapsed,
                 });
+                // Another attempt's had made its pixels durable, or nobody wants them.
+                if self.blocks_done(block.image.job) == before {
+                    self.count(block.image, &counters, Sign::Minus);
+                }
             }
             Err(Refusal::Pixels(reason)) => {
                 let message = deliver_down::Message::Refused(proto::Refused {
@@ -209,6 +213,16 @@ impl Shell {
                 self.fail_image(block.image, reason);
             }
         }
+    }
+
+    fn count(&mut self, image: ImageRef, counters: &[(String, u64)], sign: Sign) {
+        if let Some(job) = self.jobs.get_mut(image.job) {
+            job.count(image.image, counters, sign);
+        }
+    }
+
+    fn blocks_done(&self, job: JobId) -> u64 {
+        self.sched.job(job).map_or(0, |view| view.blocks_done)
     }
 
     fn encoded(&mut self, encoded: Encoded) {
@@ -232,7 +246,7 @@ impl Shell {
         }
     }
 
-    fn fail_image(&mut self, image: model::ImageRef, reason: String) {
+    fn fail_image(&mut self, image: ImageRef, reason: String) {
         let reason = convert::sentence(&reason, 2_000);
         self.jobs.touch_image(image);
         self.feed(Event::ImageFailed { image, reason });

@@ -30,6 +30,9 @@ use crate::worker::Workers;
 /// How often watchers are told of changes, at most.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
 
+/// Most workers: all must fit into one message.
+const WORKERS_MAX: u32 = 2_000;
+
 /// Inputs that are taken before a tick that is due. What had arrived before a pause of the
 /// coordinator is thus heard before anyone is blamed for being silent during it.
 const INPUTS_BEFORE_TICK: u32 = 8_192;
@@ -66,6 +69,10 @@ impl Shell {
         let sched = Sched::new(sched::Config {
             revision: Some(config.revision),
             liveness_limit: config.liveness_limit,
+            limits: sched::Limits {
+                workers_max: WORKERS_MAX,
+                ..sched::Limits::default()
+            },
             ..sched::Config::new(state.epoch())
         });
         Self {

@@ -134,7 +134,7 @@ impl Farm {
         .await;
         let shown = self.job(job).await;
         assert_eq!(all.images, shown.images, "watching shows what asking shows");
-        assert_eq!(all.summary, shown.summary);
+        assert_eq!(all.summary().state, shown.summary().state);
         all
     }
 
@@ -184,9 +184,10 @@ impl Job {
             Update::Delta(delta) => {
                 self.summary = delta.summary;
                 for changed in delta.images {
-                    let known = self.images.iter_mut();
-                    let mut known = known.filter(|image| image.image == changed.image);
-                    *known.next().expect("it was in the snapshot") = changed;
+                    let number = changed.image;
+                    let mut known = self.images.iter_mut();
+                    let known = known.find(|image| image.image == number);
+                    *known.expect("it was in the snapshot") = changed;
                 }
             }
         }

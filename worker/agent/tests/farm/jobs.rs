@@ -181,7 +181,7 @@ async fn assets_are_checked_and_fetched() {
     submission.assets = vec![(Digest::default(), ramp.to_vec())];
     let refused = submission.send(&farm).await.unwrap_err();
     assert!(refused.sentence.contains("another asset"), "{refused}");
-    assert_eq!(farm.left(), [""; 0].map(std::path::PathBuf::from));
+    assert!(farm.left().is_empty());
 
     submission.assets = vec![(digest, ramp.to_vec())];
     let job = submission.send(&farm).await.unwrap().job;
