@@ -12,6 +12,9 @@ use crate::show;
 /// A bound is found to this part of its thickness.
 const PRECISION: f64 = 1.0 / 256.0;
 
+/// Farthest from its seed that a surface may be: where the world ends, everything has some bound.
+const FAR: f64 = LENGTH_MAX / 16.0;
+
 /// The instants at which a scene can be seen.
 pub(crate) fn time_of(scene: &Description) -> Interval {
     let film = &scene.film;
@@ -138,11 +141,11 @@ impl<'a> Prover<'a> {
         }
         let far = match surface.seed {
             Seed::Sphere { .. } => Region::Shell {
-                inner: LENGTH_MAX,
+                inner: LENGTH_MAX / 2.0,
                 outer: f64::INFINITY,
             },
             Seed::Plane => Region::Slab {
-                low: LENGTH_MAX,
+                low: LENGTH_MAX / 2.0,
                 high: f64::INFINITY,
             },
         };
@@ -150,7 +153,7 @@ impl<'a> Prover<'a> {
             let program = Program::compile(&surface.graph, &[id], time_of(self.scene)).ok()?;
             let range = *program.range(&around(self.scene, far)).first()?;
             let least = if negated { -range.high } else { range.low };
-            (!(least > -LENGTH_MAX)).then(|| show::node(&surface.graph, id, 60))
+            (!(least > -FAR)).then(|| show::node(&surface.graph, id, 60))
         })
     }
 }
@@ -164,10 +167,10 @@ fn around(scene: &Description, region: Region) -> Surroundings {
     }
 }
 
-/// A distance for which `holds`, if there is one up to [`LENGTH_MAX`]; it doubles from a millimetre on.
+/// A distance for which `holds`, if there is one up to [`FAR`]; it doubles from a millimetre on.
 fn first(holds: impl Fn(f64) -> bool) -> Option<f64> {
     let mut distance = 1e-3;
-    while distance <= LENGTH_MAX {
+    while distance <= FAR {
         if holds(distance) {
             return Some(distance);
         }

@@ -30,8 +30,8 @@ pub const LAYERS_MAX: usize = 64;
 /// Most pixels of an image: eight channels of them are 8 GiB.
 pub const PIXELS_MAX: u64 = 1 << 28;
 
-/// Largest coordinate and length in metres: beyond the moon, yet 2⁻²⁰ m apart.
-pub const LENGTH_MAX: f64 = 1e9;
+/// Largest coordinate and length in metres: where the field's bounds end.
+pub const LENGTH_MAX: f64 = field::surroundings::WORLD;
 
 /// Latest instant in seconds that anything may name, in either direction.
 pub const TIME_MAX: f64 = 1e9;

@@ -130,9 +130,9 @@ fn every_kind_of_mistake_is_said_where_it_is() {
         ),
         (
             "[sky.air]",
-            "[skies.air]",
-            "skies",
-            "there is no key `skies`",
+            "[skye.air]",
+            "skye",
+            "there is no key `skye`",
             "did you mean `sky`?",
         ),
         (
@@ -508,11 +508,11 @@ fn every_kind_of_mistake_is_said_where_it_is() {
             "raise the altitude to at least \"2",
         ),
         (
+            "clearance = \"2 m\"",
+            "clearance = \"14 m\"",
             "\"30 m\"",
-            "\"23 m\"",
-            "\"23 m\"",
             clearance,
-            "raise the altitude to at least \"2",
+            "raise the altitude to at least \"3",
         ),
         (
             "albedo = [0.5, 0.5, 0.5]",
@@ -566,7 +566,7 @@ fn all_mistakes_are_found_at_once_in_the_order_of_the_file() {
          test.toml:13:1: there is no key `sampling.rayz` (did you mean `rays`?)\n\
          test.toml:16:9: \"60 m\" is a length, but an angle is wanted here (it is given in deg, rad)\n\
          test.toml:28:28: there is no `q` (the names here are p, t, seed, height, base, R, PI and those of [curves])\n\
-         test.toml:49:14: the visibility must lie between 0.001 m and 1e9 m, but it is -9000 m"
+         test.toml:49:14: the visibility must lie between 0.001 m and 1e8 m, but it is -9000 m"
     );
 }
 
