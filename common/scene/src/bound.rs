@@ -153,7 +153,7 @@ impl<'a> Prover<'a> {
             let program = Program::compile(&surface.graph, &[id], time_of(self.scene)).ok()?;
             let range = *program.range(&around(self.scene, far)).first()?;
             let least = if negated { -range.high } else { range.low };
-            (!(least > -FAR)).then(|| show::node(&surface.graph, id, 60))
+            (least <= -FAR).then(|| show::node(&surface.graph, id, 60))
         })
     }
 }

@@ -2,8 +2,13 @@
 //!
 //! A scene file and canonical bytes pass the same rules. Rules that must look at
 //! the surface itself (does the path keep clear of the ground?) stand in
-//! [`crate::ground`] and [`crate::bound`]; they guard users from mistakes, these
+//! `crate::ground` and `crate::bound`; they guard users from mistakes, these
 //! guard the farm from anybody.
+
+#![expect(
+    clippy::neg_cmp_op_on_partial_ord,
+    reason = "what is not known to be right is wrong: NaN breaks every rule"
+)]
 
 mod camera;
 mod film;

@@ -65,8 +65,9 @@ fn second_derivatives(times: &[f64], places: &[Vector]) -> Vec<Vector> {
         }
     }
     for i in (1..count - 1).rev() {
-        for k in 0..3 {
-            bends[i][k] -= upper[i] * bends[i + 1][k];
+        let after = bends[i + 1];
+        for (bend, after) in bends[i].iter_mut().zip(after) {
+            *bend -= upper[i] * after;
         }
     }
     bends

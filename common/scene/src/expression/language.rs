@@ -191,7 +191,8 @@ fn comparisons(engine: &mut Engine) {
 fn functions(engine: &mut Engine, shared: &Rc<Shared>) {
     let least = |a: f64, b: f64| if b < a { b } else { a };
     let largest = |a: f64, b: f64| if b > a { b } else { a };
-    let of_one: [(&str, Op, fn(f64) -> f64); 5] = [
+    type OfOne = (&'static str, Op, fn(f64) -> f64);
+    let of_one: [OfOne; 5] = [
         ("abs", Op::Abs, f64::abs),
         (
             "sqrt",

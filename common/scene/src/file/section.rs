@@ -65,7 +65,7 @@ impl<'a> Reader<'a> {
         !self.mistakes.borrow().is_empty()
     }
 
-    pub(super) fn into_mistakes(&self) -> Vec<Mistake> {
+    pub(super) fn take_mistakes(&self) -> Vec<Mistake> {
         self.mistakes.take()
     }
 

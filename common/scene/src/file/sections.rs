@@ -77,7 +77,7 @@ pub(super) fn scene(
     description.surface.graph = making.fields.into_graph();
     finish(reader, description, surface.bound_given)
         .map(|description| (description, assets))
-        .ok_or_else(|| reader.into_mistakes())
+        .ok_or_else(|| reader.take_mistakes())
 }
 
 /// Holds the scene to all rules, and finds where its surface can be.

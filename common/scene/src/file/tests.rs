@@ -726,7 +726,7 @@ fn assets_are_read_by_content_and_confined() {
     let (asset, bytes) = &loaded.assets[0];
     assert_eq!((asset.bytes, &bytes[..]), (6, &b"pixels"[..]));
     assert_eq!(asset.digest.0, *blake3::hash(b"pixels").as_bytes());
-    assert_eq!(loaded.description.assets, [asset.clone()]);
+    assert_eq!(loaded.description.assets, std::slice::from_ref(asset));
     #[cfg(unix)]
     {
         let outside = tempfile::NamedTempFile::new().unwrap();
