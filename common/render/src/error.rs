@@ -27,7 +27,9 @@ pub enum RenderError {
         order: u32,
     },
     /// The samples of a pixel centre coincide.
-    #[error("filter order 0 samples pixel centres alone, so it goes with 1 ray per pixel, not {rays} × {rays}")]
+    #[error(
+        "filter order 0 samples pixel centres alone, so it goes with 1 ray per pixel, not {rays} × {rays}"
+    )]
     CentreAlone {
         /// Rays along each side.
         rays: u32,

@@ -309,12 +309,8 @@ impl ImageRenderer {
         }));
         for first in (0..touched.len()).step_by(BATCH) {
             let n = BATCH.min(touched.len() - first);
-            self.palette.evaluate(
-                self.surface.level,
-                &places.batch(first, n),
-                scratch,
-                fields,
-            );
+            self.palette
+                .evaluate(self.surface.level, &places.batch(first, n), scratch, fields);
             for i in 0..n {
                 let touched = &touched[first + i];
                 let direction = sights[touched.sample].direction;

@@ -78,10 +78,7 @@ impl BSpline {
             }
         }
         let share = x / self.width();
-        (
-            share * row[0] + (1.0 - share) * row[1],
-            row[0] - row[1],
-        )
+        (share * row[0] + (1.0 - share) * row[1], row[0] - row[1])
     }
 
     /// The x with N_m(x) = y, y in 0 … ½, by Newton's method, thesis eq. (6.19) mended.

@@ -26,14 +26,18 @@ impl Lit {
     pub(crate) fn radiance(&self, sky: &Sky) -> Colour {
         let facing = self.normal.dot(sky.sun);
         let direct = if facing > 0.0 && self.sun > 0.0 {
-            self.sun * facing * oren_nayar(facing, self.normal.dot(-self.direction), sky.sun.dot(-self.direction))
+            self.sun
+                * facing
+                * oren_nayar(
+                    facing,
+                    self.normal.dot(-self.direction),
+                    sky.sun.dot(-self.direction),
+                )
         } else {
             0.0
         };
         let ambient = sky.ambient(self.normal);
-        [0, 1, 2].map(|c| {
-            self.albedo[c] * (sky.sunlight[c] * direct + ambient[c] * FRAC_1_PI)
-        })
+        [0, 1, 2].map(|c| self.albedo[c] * (sky.sunlight[c] * direct + ambient[c] * FRAC_1_PI))
     }
 }
 

@@ -109,7 +109,11 @@ impl Dome {
         };
         let (row, v) = place(rise.sqrt(), ROWS);
         let (column, u) = place((1.0 - side) / 2.0, COLUMNS);
-        let flat = if rise < 1.0 { (1.0 - rise * rise).sqrt() } else { 0.0 };
+        let flat = if rise < 1.0 {
+            (1.0 - rise * rise).sqrt()
+        } else {
+            0.0
+        };
         let cosine = flat * side * self.sun.dot(self.sunwards) + rise * self.sun.dot(self.up);
         let (rayleigh, haze) = (rayleigh_phase(cosine), haze_phase(cosine));
         let mut light = [0.0; 3];
@@ -129,7 +133,9 @@ impl Dome {
     /// Mean radiance over all directions, the lit ground below included.
     fn mean(&self) -> Colour {
         let mut sky = [0.0; 3];
-        let mut down = self.sunlight.map(|light| light * self.sun.dot(self.up).max(0.0));
+        let mut down = self
+            .sunlight
+            .map(|light| light * self.sun.dot(self.up).max(0.0));
         let rows: usize = 16;
         let columns: usize = 32;
         for row in 0..rows {
@@ -139,8 +145,7 @@ impl Dome {
                 let angle = (column as f64 + 0.5) / columns as f64 * core::f64::consts::PI;
                 let (sine, cosine) = libm::sincos(angle);
                 let across = self.up.cross(self.sunwards);
-                let direction =
-                    self.up * rise + (self.sunwards * cosine + across * sine) * flat;
+                let direction = self.up * rise + (self.sunwards * cosine + across * sine) * flat;
                 let light = self.radiance_once(direction, rise);
                 for c in 0..3 {
                     sky[c] += light[c] / (rows * columns) as f64;
@@ -157,7 +162,11 @@ impl Dome {
         let (rayleigh, haze) = (rayleigh_phase(cosine), haze_phase(cosine));
         let side = direction - self.up * rise;
         let length = side.dot(side).sqrt();
-        let side = if length > 1e-12 { side.dot(self.sunwards) / length } else { 0.0 };
+        let side = if length > 1e-12 {
+            side.dot(self.sunwards) / length
+        } else {
+            0.0
+        };
         let (row, _) = place(rise.sqrt(), ROWS);
         let (column, _) = place((1.0 - side) / 2.0, COLUMNS);
         let entry = &self.entries[row * COLUMNS + column];

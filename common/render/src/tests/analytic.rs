@@ -19,11 +19,14 @@ fn pixels(scene: &Description) -> Vec<([f64; 8], DVec3, u32)> {
     let (planes, _) = image(scene, EvalSettings::default());
     let resolution = scene.film.resolution;
     let area = resolution.rect().area() as usize;
-    let pixel = 2.0 * libm::tan(scene.camera.projection.extent(0.0) / 2.0)
-        / f64::from(resolution.width);
+    let pixel =
+        2.0 * libm::tan(scene.camera.projection.extent(0.0) / 2.0) / f64::from(resolution.width);
     (0..area)
         .map(|index| {
-            let (x, y) = (index % resolution.width as usize, index / resolution.width as usize);
+            let (x, y) = (
+                index % resolution.width as usize,
+                index / resolution.width as usize,
+            );
             let direction = DVec3::new(
                 (x as f64 + 0.5 - f64::from(resolution.width) / 2.0) * pixel,
                 1.0,
@@ -52,8 +55,12 @@ fn a_sphere_has_its_silhouette_depth_and_normal() {
         let distance = along - discriminant.sqrt();
         // The chord's root within a grid gap of a thousandth, at the silhouette's curvature.
         let tolerance = if discriminant > 0.05 { 1e-6 } else { 1e-3 };
-        assert!((values[4] - distance).abs() < tolerance, "{} {distance}", values[4]);
-        let normal = eye + direction * values[4];
+        assert!(
+            (values[4] - distance).abs() < tolerance,
+            "{} {distance}",
+            values[4]
+        );
+        let normal = (eye + direction * values[4]).normalize();
         for axis in 0..3 {
             assert!((values[5 + axis] - normal[axis]).abs() < 1e-5);
         }
@@ -61,7 +68,10 @@ fn a_sphere_has_its_silhouette_depth_and_normal() {
     // The cone that touches the sphere has tan² = 1/15; a pixel is 2 tan 0.4 / 48 wide.
     let pixel = 2.0 * libm::tan(0.4) / 48.0;
     let expected = core::f64::consts::PI / 15.0 / (pixel * pixel);
-    assert!((f64::from(hits) / expected - 1.0).abs() < 0.02, "{hits} {expected}");
+    assert!(
+        (f64::from(hits) / expected - 1.0).abs() < 0.02,
+        "{hits} {expected}"
+    );
 }
 
 #[test]
@@ -87,7 +97,11 @@ fn a_constant_sky_is_constant_and_light_from_all_around_shows_the_albedo() {
         ambient: [core::f64::consts::PI; 3],
     };
     for (values, _, _) in pixels(&scene) {
-        let expected = if values[3] == 0.0 { [1.0; 3] } else { [0.4, 0.3, 0.2] };
+        let expected = if values[3] == 0.0 {
+            [1.0; 3]
+        } else {
+            [0.4, 0.3, 0.2]
+        };
         for c in 0..3 {
             assert!((values[c] - expected[c]).abs() < 1e-6);
         }
@@ -126,7 +140,11 @@ fn coverage_of_a_filtered_edge_is_the_filters_share_above_it() {
             20 => 0.875,
             _ => 1.0,
         };
-        assert!((values[3] - expected).abs() < 0.005, "row {row}: {}", values[3]);
+        assert!(
+            (values[3] - expected).abs() < 0.005,
+            "row {row}: {}",
+            values[3]
+        );
     }
 }
 
@@ -142,7 +160,12 @@ fn a_scene_far_away_melts_into_the_horizon() {
     for x in 0..48 {
         let (above, below) = (&rows[19 * 48 + x].0, &rows[20 * 48 + x].0);
         for c in 0..3 {
-            assert!((above[c] / below[c] - 1.0).abs() < 0.05, "{} {}", above[c], below[c]);
+            assert!(
+                (above[c] / below[c] - 1.0).abs() < 0.05,
+                "{} {}",
+                above[c],
+                below[c]
+            );
         }
     }
 }

@@ -9,12 +9,13 @@ use glam::DVec3;
 use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
+use crate::trace::bracket::{Bracket, End};
 use crate::trace::{Goal, Hit, Ray, Surface, Tracer, bound};
 use crate::view::View;
 
-/// Few pixels, so that the grid is coarse enough to be scanned.
-fn coarse(mut scene: scene::Description) -> scene::Description {
-    scene.film.resolution.width = 40;
+/// As wide as an image may be for its grid to be scanned.
+fn scannable(mut scene: scene::Description) -> scene::Description {
+    scene.film.resolution.width = 400;
     scene.film.window = scene.film.resolution.rect();
     scene
 }
@@ -25,8 +26,7 @@ fn scan(surface: &Surface, ray: &Ray) -> Hit {
         return Hit::None;
     };
     let (first, last) = (ray.grid.first_from(start), ray.grid.first_from(end));
-    let value = |index: i64| {
-        let t = ray.grid.place(index);
+    let value = |t: f64| {
         let place = ray.origin + ray.direction * t;
         let distance = {
             let square = ray.from_eye.dot(ray.from_eye);
@@ -45,24 +45,31 @@ fn scan(surface: &Surface, ray: &Ray) -> Hit {
             &mut Scratch::new(),
             &mut [&mut value],
         );
-        (value[0], bound::contains(&surface.bound, place))
+        (value[0], surface.footprint.at(distance))
     };
+    let within = |t: f64| bound::contains(&surface.bound, ray.origin + ray.direction * t);
     for index in first..=last {
-        let (inside, within) = value(index);
-        if inside > 0.0 || !within {
+        let far = ray.grid.place(index);
+        let (inside, _) = value(far);
+        if inside > 0.0 || !within(far) {
             continue;
         }
-        let far = ray.grid.place(index);
         if index == 0 {
             return Hit::Surface(far);
         }
         let near = ray.grid.place(index - 1);
-        let (outside, within) = value(index - 1);
-        return if within {
-            Hit::Surface(near + (far - near) * (outside / (outside - inside)))
-        } else {
-            Hit::Face(far)
-        };
+        let (outside, _) = value(near);
+        if !within(near) {
+            return Hit::Face(far);
+        }
+        let end = |t, value| End { t, value };
+        let mut bracket = Bracket::new(end(near, outside), end(far, inside));
+        loop {
+            let (middle, footprint) = value(bracket.middle);
+            if let Some(root) = bracket.narrow(middle, footprint) {
+                return Hit::Surface(root);
+            }
+        }
     }
     Hit::None
 }
@@ -72,10 +79,7 @@ fn rays(surface: &Surface, view: &View, count: u32) -> Vec<Ray> {
     (0..count)
         .map(|index| {
             let sight = view.sight(&Sample {
-                place: [
-                    40.0 * random(index, 0),
-                    40.0 * random(index, 1),
-                ],
+                place: [400.0 * random(index, 0), 40.0 * random(index, 1)],
                 instant: random(index, 2),
             });
             Ray {
@@ -110,7 +114,7 @@ fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
 #[test]
 fn the_search_finds_what_a_scan_finds() {
     for (name, scene) in scenes::all() {
-        let scene = coarse(scene);
+        let scene = scannable(scene);
         let view = View::new(&scene.camera, &scene.film, 0.0);
         let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
         let rays = rays(&surface, &view, 60);
@@ -120,14 +124,17 @@ fn the_search_finds_what_a_scan_finds() {
         }
         assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
         let per_ray = counts.steps / 60;
-        assert!(per_ray < 400, "{name} took {per_ray} steps a ray: nothing is proven");
+        assert!(
+            per_ray < 400,
+            "{name} took {per_ray} steps a ray: nothing is proven"
+        );
     }
 }
 
 #[test]
 fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
     for (name, scene) in [("ridges", scenes::ridges()), ("cube", scenes::cube())] {
-        let scene = coarse(scene);
+        let scene = scannable(scene);
         let view = View::new(&scene.camera, &scene.film, 0.0);
         let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
         let sights = rays(&surface, &view, 80);
@@ -150,7 +157,11 @@ fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
             .collect();
         let (shaded, _) = trace(&surface, Goal::Occlusion, &shadows);
         for (ray, hit) in shadows.iter().zip(&shaded) {
-            assert_eq!(*hit != Hit::None, scan(&surface, ray) != Hit::None, "{name}");
+            assert_eq!(
+                *hit != Hit::None,
+                scan(&surface, ray) != Hit::None,
+                "{name}"
+            );
         }
         assert!(shaded.iter().any(|hit| *hit != Hit::None));
         assert!(shaded.contains(&Hit::None));

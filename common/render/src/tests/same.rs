@@ -63,7 +63,10 @@ fn paste(part: &[f32], rect: Rect, pixels: &mut [f32], whole: Rect) {
     let full = whole.area() as usize;
     for (index, value) in part.iter().enumerate() {
         let (plane, rest) = (index / (width * height), index % (width * height));
-        let (x, y) = (rect.x0 as usize + rest % width, rect.y0 as usize + rest / width);
+        let (x, y) = (
+            rect.x0 as usize + rest % width,
+            rect.y0 as usize + rest / width,
+        );
         pixels[plane * full + y * whole.width() as usize + x] = *value;
     }
 }
@@ -123,20 +126,24 @@ fn what_cannot_be_rendered_is_refused_in_words() {
                 digest: model::Digest([5; 32]),
                 bytes: 10,
             });
-            scene.surface.material.layers.push(scene::description::Layer {
-                albedo: [1.0; 3],
-                above: None,
-                below: None,
-                steeper: None,
-                gentler: None,
-                cover: None,
-                height_offset: None,
-                ramp: Some(scene::description::Ramp {
-                    asset: 0,
-                    low: 0.0,
-                    high: 1.0,
-                }),
-            });
+            scene
+                .surface
+                .material
+                .layers
+                .push(scene::description::Layer {
+                    albedo: [1.0; 3],
+                    above: None,
+                    below: None,
+                    steeper: None,
+                    gentler: None,
+                    cover: None,
+                    height_offset: None,
+                    ramp: Some(scene::description::Ramp {
+                        asset: 0,
+                        low: 0.0,
+                        high: 1.0,
+                    }),
+                });
         },
         0,
     );

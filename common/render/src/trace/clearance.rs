@@ -72,8 +72,7 @@ impl Clearance {
             }
             // Of three in a row the middle one is of use only below the line through the others.
             while let [.., a, b] = levels[..] {
-                let middle_is_above =
-                    (b.1 - a.1) * (offset - a.0) >= (slope - a.1) * (b.0 - a.0);
+                let middle_is_above = (b.1 - a.1) * (offset - a.0) >= (slope - a.1) * (b.0 - a.0);
                 if !middle_is_above {
                     break;
                 }
@@ -110,13 +109,18 @@ impl Clearance {
             (at, best) = (at - 1, next);
         }
         *hint = at;
-        best
+        if best > 0.0 { best } else { 0.0 }
     }
 
-    /// How far back no root can be; `growth` is that of the known part at the place or more.
+    /// How far back no root can be, by the level that `hint` names.
     #[inline]
-    pub(crate) fn behind(&self, value: f64, growth: f64, hint: &mut usize) -> f64 {
-        self.ahead(value, -growth, hint)
+    pub(crate) fn behind(&self, value: f64, growth: f64, hint: usize) -> f64 {
+        if hint < self.levels.len() {
+            let behind = self.at_level(hint, value, -growth);
+            if behind > 0.0 { behind } else { 0.0 }
+        } else {
+            0.0
+        }
     }
 
     #[inline]
@@ -268,7 +272,14 @@ mod tests {
 
     #[test]
     fn the_best_level_is_found_from_every_hint() {
-        let levels = [(0.0, 9.0), (0.1, 6.0), (0.35, 4.0), (0.9, 2.5), (2.0, 1.5), (5.0, 1.0)];
+        let levels = [
+            (0.0, 9.0),
+            (0.1, 6.0),
+            (0.35, 4.0),
+            (0.9, 2.5),
+            (2.0, 1.5),
+            (5.0, 1.0),
+        ];
         let clearance = clearance(&levels);
         for value in [0.01, 0.09, 0.2, 0.5, 1.0, 3.0, 7.0, 100.0] {
             for growth in [-1.0, -0.3, 0.0, 0.3, 0.99] {
@@ -279,7 +290,10 @@ mod tests {
                 let best = if best < 1e6 { best } else { 1e6 };
                 for hint in 0..levels.len() {
                     let found = clearance.ahead(value, growth, &mut { hint });
-                    assert!(found <= best && found >= best * 0.999_999, "{value} {growth}");
+                    assert!(
+                        found <= best && found >= best * 0.999_999,
+                        "{value} {growth}"
+                    );
                 }
             }
         }
@@ -287,8 +301,18 @@ mod tests {
 
     #[test]
     fn a_level_that_is_never_best_is_dropped() {
-        assert_eq!(clearance(&[(0.0, 4.0), (1.0, 3.9), (2.0, 1.0)]).levels.len(), 2);
-        assert_eq!(clearance(&[(0.0, 4.0), (0.5, 2.0), (2.0, 1.0)]).levels.len(), 3);
+        assert_eq!(
+            clearance(&[(0.0, 4.0), (1.0, 3.9), (2.0, 1.0)])
+                .levels
+                .len(),
+            2
+        );
+        assert_eq!(
+            clearance(&[(0.0, 4.0), (0.5, 2.0), (2.0, 1.0)])
+                .levels
+                .len(),
+            3
+        );
         assert_eq!(clearance(&[]).ahead(3.0, 0.0, &mut 0), 0.0);
     }
 

@@ -109,7 +109,11 @@ mod tests {
 
     #[test]
     fn the_first_point_from_a_distance_never_skips_one() {
-        for grid in [Grid::from_eye(3e-5), Grid::even(0.01, 1e5), Grid::even(1e-5, 1.0)] {
+        for grid in [
+            Grid::from_eye(3e-5),
+            Grid::even(0.01, 1e5),
+            Grid::even(1e-5, 1.0),
+        ] {
             let mut t = 1e-7;
             while t < 1e11 {
                 let index = grid.first_from(t);

@@ -5,6 +5,7 @@
 //! gets there ([`tracer`]) decides only what need not be looked at.
 
 pub(crate) mod bound;
+pub(crate) mod bracket;
 pub(crate) mod clearance;
 pub(crate) mod grid;
 pub(crate) mod split;

@@ -11,11 +11,11 @@ use super::split::split;
 use crate::error::RenderError;
 use crate::view::{Footprint, View};
 
-/// Neighbouring points of a camera ray's grid are this share of a footprint apart, or up to half of it.
-const SHARE: f64 = 1.0 / 32.0;
+/// Neighbouring points of a camera ray's grid are this share of a footprint apart, or down to half of it.
+const SHARE: f64 = 1.0 / 2.0;
 
 /// The same for rays towards the sun.
-const SHADOW_SHARE: f64 = 1.0 / 8.0;
+const SHADOW_SHARE: f64 = 1.0 / 2.0;
 
 /// Where parallel rays stop having points at even distances, in points: 2⁴⁰.
 const EVEN_POINTS: f64 = 1_099_511_627_776.0;

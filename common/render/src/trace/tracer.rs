@@ -10,13 +10,18 @@ use field::{BATCH, Points, Scratch};
 use glam::DVec3;
 
 use super::bound;
+use super::bracket::{Bracket, End};
 use super::grid::Grid;
 use super::surface::Surface;
 use crate::counts::Counts;
 use crate::error::Cancelled;
 
-/// How much farther than proven a step reaches, thesis §5.2.2.
+/// How much farther than proven a first step reaches, thesis §5.2.2.
 const OVERSHOOT: f64 = 1.46;
+
+/// The share of the way to where both ends of a step would just meet, if the field went on as it
+/// did from the last point to this one. Later steps reach there: up to twice as far as proven.
+const FORESIGHT: f64 = 0.9;
 
 /// Most evaluations along one ray. A ray that is still not done then runs along the
 /// surface within a step of it, and counts as meeting it where it stands.
@@ -105,18 +110,32 @@ struct Lane {
     end: i64,
     /// All points before this one are known to be outside.
     clear: i64,
-    /// The point whose value is wanted.
+    /// The point whose value is wanted, while searching.
     at: i64,
+    /// The distance at which a value is wanted.
+    t: f64,
     /// A point known to be inside, or `NOWHERE`.
     inside: i64,
     inside_value: f64,
     /// The last point evaluated and found outside, with all before it.
     outside: i64,
+    outside_t: f64,
     outside_value: f64,
     steps: u32,
     hint: usize,
-    /// The value wanted is that of the point before the hit.
-    polishing: bool,
+    stage: Stage,
+    bracket: Bracket,
+}
+
+/// What a lane wants a value for.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Stage {
+    /// To find the first point inside.
+    Search,
+    /// That point is known: to know the value at the one before it.
+    Before,
+    /// The root lies between the two: to close in on it.
+    Polish,
 }
 
 impl Tracer {
@@ -180,7 +199,7 @@ impl Batch {
             column.resize(n, 0.0);
         }
         for (i, lane) in lanes.iter().enumerate() {
-            let t = lane.grid.place(lane.at);
+            let t = lane.t;
             let place = lane.origin + lane.direction * t;
             let distance = (lane.eye_square + t * (lane.eye_along + t)).sqrt();
             self.x[i] = place.x;
@@ -222,17 +241,21 @@ impl Lane {
             end,
             clear,
             at: clear,
+            t: ray.grid.place(clear),
             inside: NOWHERE,
             inside_value: 0.0,
             outside: NOWHERE,
+            outside_t: 0.0,
             outside_value: 0.0,
             steps: 0,
             hint: 0,
-            polishing: false,
+            stage: Stage::Search,
+            bracket: Bracket::default(),
         })
     }
 
-    /// Takes the value at the point that was wanted; returns the result, or wants another.
+    /// Takes the value that was wanted; returns the result, or wants another.
+    #[inline]
     fn step(
         &mut self,
         surface: &Surface,
@@ -241,16 +264,34 @@ impl Lane {
         distance: f64,
         counts: &mut Counts,
     ) -> Option<Hit> {
-        if self.polishing {
-            return Some(self.polished(value));
+        match self.stage {
+            Stage::Search => self.search(surface, goal, value, distance, counts),
+            Stage::Before => self.enclose(value),
+            Stage::Polish => {
+                let root = self.bracket.narrow(value, surface.footprint.at(distance));
+                self.t = self.bracket.middle;
+                root.map(Hit::Surface)
+            }
         }
+    }
+
+    /// One step of the search.
+    #[inline]
+    fn search(
+        &mut self,
+        surface: &Surface,
+        goal: Goal,
+        value: f64,
+        distance: f64,
+        counts: &mut Counts,
+    ) -> Option<Hit> {
         counts.steps += 1;
         self.steps += 1;
         if self.steps > STEPS_MAX {
             counts.exhausted += 1;
             return Some(Hit::Surface(self.grid.place(self.clear)));
         }
-        let place = self.origin + self.direction * self.grid.place(self.at);
+        let place = self.origin + self.direction * self.t;
         // A value that is not finite proves nothing about its surroundings.
         let proof = if bound::contains(&surface.bound, place) && value.is_finite() {
             value
@@ -258,24 +299,28 @@ impl Lane {
             0.0
         };
         if value > 0.0 || proof == 0.0 {
-            self.passed(surface, place, proof, distance, counts);
-        } else if self.at == self.clear {
-            self.inside = self.at;
-            self.inside_value = value;
+            self.pass(surface, place, proof, distance, counts);
         } else {
-            counts.backtracks += 1;
             self.inside = self.at;
             self.inside_value = value;
-            self.at = self.clear;
+            if self.at > self.clear {
+                counts.backtracks += 1;
+                self.at = self.clear;
+            }
         }
         if self.clear >= self.inside {
             return self.found(surface, goal);
         }
-        (self.clear > self.end).then_some(Hit::None)
+        if self.clear > self.end {
+            return Some(Hit::None);
+        }
+        self.t = self.grid.place(self.at);
+        None
     }
 
     /// The point is outside, with that value: what does it prove, and where to look next?
-    fn passed(
+    #[inline]
+    fn pass(
         &mut self,
         surface: &Surface,
         place: DVec3,
@@ -286,47 +331,67 @@ impl Lane {
         let clearances = &surface.clearances;
         let clearance = clearances.at(distance);
         let growth = clearances.known.growth(place, self.direction);
-        let t = self.grid.place(self.at);
-        if self.at > self.clear {
-            let behind = clearance.behind(value, growth, &mut self.hint);
-            if self.grid.place(self.clear) <= t - behind {
-                counts.backtracks += 1;
-                self.at = self.clear;
-                return;
-            }
-        }
         let ahead = clearance.ahead(value, growth, &mut self.hint);
+        let behind = clearance.behind(value, growth, self.hint);
+        if self.at > self.clear && self.grid.place(self.clear) <= self.t - behind {
+            counts.backtracks += 1;
+            self.at = self.clear;
+            return;
+        }
+        let reach = if self.outside == NOWHERE {
+            OVERSHOOT * ahead
+        } else {
+            // With x the way to go and c the rate of fall, the spheres at both ends meet where
+            // x = ahead + behind · (value − c x) / value.
+            let fall = (self.outside_value - value) / (self.t - self.outside_t);
+            let meet = (ahead + behind) * value / (value + behind * fall);
+            if meet > ahead {
+                FORESIGHT * meet
+            } else {
+                ahead
+            }
+        };
         self.outside = self.at;
+        self.outside_t = self.t;
         self.outside_value = value;
-        self.clear = self.grid.first_from(t + ahead).max(self.at + 1);
-        let next = self.grid.first_from(t + OVERSHOOT * ahead);
+        self.clear = self.grid.first_from(self.t + ahead).max(self.at + 1);
+        // The last point within reach: one beyond would not be covered.
+        let next = self.grid.first_from(self.t + reach) - 1;
         self.at = next.min(self.inside - 1).min(self.end).max(self.clear);
     }
 
-    /// The first point inside is known: polish it, or ask for the value before it.
+    /// The first point inside is known: ask for the value before it, or begin to polish.
     fn found(&mut self, surface: &Surface, goal: Goal) -> Option<Hit> {
-        let t = self.grid.place(self.inside);
+        let far = self.grid.place(self.inside);
         if goal == Goal::Occlusion || self.inside == 0 {
-            return Some(Hit::Surface(t));
+            return Some(Hit::Surface(far));
         }
         let before = self.inside - 1;
-        let place = self.origin + self.direction * self.grid.place(before);
-        if !bound::contains(&surface.bound, place) {
-            return Some(Hit::Face(t));
+        let near = self.grid.place(before);
+        if !bound::contains(&surface.bound, self.origin + self.direction * near) {
+            return Some(Hit::Face(far));
         }
-        self.polishing = true;
-        self.at = before;
-        (self.outside == before).then(|| self.polished(self.outside_value))
+        if self.outside == before {
+            return self.enclose(self.outside_value);
+        }
+        self.stage = Stage::Before;
+        self.t = near;
+        None
     }
 
-    /// The root of the chord between the hit and the point before it.
-    fn polished(&self, before: f64) -> Hit {
-        let (near, far) = (self.grid.place(self.inside - 1), self.grid.place(self.inside));
-        let drop = before - self.inside_value;
-        Hit::Surface(if before > 0.0 && before.is_finite() && drop > 0.0 {
-            near + (far - near) * (before / drop)
-        } else {
-            far
-        })
+    /// The value at the point before the hit is known: the root is enclosed.
+    fn enclose(&mut self, outside: f64) -> Option<Hit> {
+        let end = |index: i64, value: f64| End {
+            t: self.grid.place(index),
+            value,
+        };
+        let far = end(self.inside, self.inside_value);
+        if !(outside > 0.0 && outside.is_finite()) {
+            return Some(Hit::Surface(far.t));
+        }
+        self.bracket = Bracket::new(end(self.inside - 1, outside), far);
+        self.stage = Stage::Polish;
+        self.t = self.bracket.middle;
+        None
     }
 }
