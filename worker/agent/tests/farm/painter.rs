@@ -15,14 +15,14 @@ pub(crate) const REVISION: Revision = Revision(77);
 /// Paints [`value`] everywhere.
 #[derive(Clone, Default)]
 pub(crate) struct Ramp {
-    shared: Arc<Shared>,
+    pub(crate) shared: Arc<Shared>,
     pub(crate) foreign: bool,
     /// Panics when it is to render this image.
     pub(crate) panics_at: Option<u32>,
 }
 
 #[derive(Default)]
-struct Shared {
+pub(crate) struct Shared {
     state: Mutex<State>,
     changed: Condvar,
 }
