@@ -248,17 +248,16 @@ impl Octave {
             c[0] * x + c[1] * y + c[2] * z + r,
         ]
     }
+}
 
-    /// A gradient by the octave's coordinates as one by the cascade's argument.
-    #[inline(always)]
-    pub(crate) fn pull(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
-        let [a, b, c] = &self.matrix;
-        [
-            a[0] * x + b[0] * y + c[0] * z,
-            a[1] * x + b[1] * y + c[1] * z,
-            a[2] * x + b[2] * y + c[2] * z,
-        ]
-    }
+/// A gradient by an octave's coordinates as one by the cascade's argument, given the octave's matrix.
+#[inline(always)]
+pub(crate) fn pull([a, b, c]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
+    [
+        a[0] * x + b[0] * y + c[0] * z,
+        a[1] * x + b[1] * y + c[1] * z,
+        a[2] * x + b[2] * y + c[2] * z,
+    ]
 }
 
 fn octaves_of(key: f64, lacunarity: f64, hurst: f64, octaves: f64) -> Vec<Octave> {

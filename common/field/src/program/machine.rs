@@ -138,6 +138,7 @@ impl Machine {
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, instruction: &Instruction, count: Count) -> u64 {
         let n = count.lanes;
+        assert!(n <= BATCH);
         let [a, b, c] = instruction.args.map(|arg| &*self.registers[arg]);
         let out = &mut *self.result;
         match &instruction.act {

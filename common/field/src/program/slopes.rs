@@ -38,10 +38,11 @@ impl Duals {
 
     #[inline(always)]
     fn set(&mut self, i: usize, dual: Dual) {
+        let ([x, y, z], [a, b, c]) = (&mut self.gradient, dual.gradient);
         self.value[i] = dual.value;
-        for (lanes, part) in self.gradient.iter_mut().zip(dual.gradient) {
-            lanes[i] = part;
-        }
+        x[i] = a;
+        y[i] = b;
+        z[i] = c;
     }
 
     fn set_constant(&mut self, value: f64) {
@@ -65,11 +66,25 @@ pub(crate) struct Slopes {
 #[derive(Debug)]
 struct Octaves {
     cells: Cells,
+    sample: Sample,
+    total: Box<Duals>,
+    rest: Box<Duals>,
+}
+
+/// One octave's noise over the lanes.
+#[derive(Debug)]
+struct Sample {
     noise: [f32; BATCH],
     gradient: [[f32; BATCH]; 3],
     depth: Lanes,
-    total: Box<Duals>,
-    rest: Box<Duals>,
+}
+
+/// Which octave.
+#[derive(Clone, Copy)]
+struct Place<'a> {
+    n: usize,
+    i: f64,
+    octave: &'a Octave,
 }
 
 impl Default for Slopes {
@@ -80,9 +95,11 @@ impl Default for Slopes {
             result: Duals::new(),
             octaves: Box::new(Octaves {
                 cells: Cells::new(),
-                noise: [0.0; BATCH],
-                gradient: [[0.0; BATCH]; 3],
-                depth: [0.0; BATCH],
+                sample: Sample {
+                    noise: [0.0; BATCH],
+                    gradient: [[0.0; BATCH]; 3],
+                    depth: [0.0; BATCH],
+                },
                 total: Duals::new(),
                 rest: Duals::new(),
             }),
@@ -146,6 +163,7 @@ impl Slopes {
     #[inline(always)]
     fn step<S: Simd>(&mut self, simd: S, instruction: &Instruction, count: Count) -> u64 {
         let n = count.lanes;
+        assert!(n <= BATCH);
         let [a, b, c] = instruction.args.map(|arg| &*self.registers[arg]);
         let out = &mut *self.result;
         match &instruction.act {
@@ -208,12 +226,10 @@ impl Slopes {
                 },
             ),
             Operation::Noise(lattice) => {
-                let Octaves {
-                    cells,
-                    noise,
-                    gradient,
-                    ..
-                } = &mut *self.octaves;
+                let Octaves { cells, sample, .. } = &mut *self.octaves;
+                let Sample {
+                    noise, gradient, ..
+                } = sample;
                 lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
                 lanes::values_gradients(simd, n, *lattice, cells, noise, gradient);
                 let [gx, gy, gz] = gradient;
@@ -284,98 +300,116 @@ impl Octaves {
     ) -> u64 {
         let n = count.lanes;
         let mut noises = 0;
-        machine::depths(cascade, n, footprint, &mut self.depth);
-        self.total.set_constant(0.0);
-        self.rest.set_constant(0.0);
+        let Self {
+            cells,
+            sample,
+            total,
+            rest,
+        } = self;
+        machine::depths(cascade, n, footprint, &mut sample.depth);
+        total.set_constant(0.0);
+        rest.set_constant(0.0);
         for (i, octave) in cascade.octaves.iter().enumerate() {
             let i = cascade::index(i);
-            let live = machine::live(&self.depth, count.points, i);
+            let live = machine::live(&sample.depth, count.points, i);
             if live == 0 {
                 break;
             }
             noises += live;
-            lanes::place(simd, n, octave, at, &mut self.cells);
+            lanes::place(simd, n, octave, at, cells);
             lanes::values_gradients(
                 simd,
                 n,
                 octave.lattice,
-                &mut self.cells,
-                &mut self.noise,
-                &mut self.gradient,
+                cells,
+                &mut sample.noise,
+                &mut sample.gradient,
             );
-            match cascade.model {
-                Model::Sum(basis) => self.each(
-                    n,
-                    i,
-                    octave,
-                    #[inline(always)]
-                    |t, n, c| cascade::sum(basis, t, n, c),
-                ),
-                Model::AltitudeOne { basis, xi } => {
-                    self.each(
-                        n,
-                        i,
-                        octave,
-                        #[inline(always)]
-                        |t, n, c| cascade::altitude_one(basis, xi, t, n, c),
-                    );
-                }
-                Model::AltitudeTwo { basis, xi } => {
-                    self.each(
-                        n,
-                        i,
-                        octave,
-                        #[inline(always)]
-                        |t, n, c| cascade::altitude_two(basis, xi, t, n, c),
-                    );
-                }
-                Model::Ridged { offset, gain } => {
-                    self.each(
-                        n,
-                        i,
-                        octave,
-                        #[inline(always)]
-                        |t, n, c| cascade::ridged(offset, gain, t, n, c),
-                    );
-                }
-            }
+            add(cascade.model, Place { n, i, octave }, sample, total, rest);
         }
         noises
     }
+}
 
-    #[inline(always)]
-    fn each(
-        &mut self,
-        n: usize,
-        i: f64,
-        octave: &Octave,
-        add: impl Fn(Term, Dual, Carried<Dual>) -> Carried<Dual>,
-    ) {
-        let [gx, gy, gz] = &self.gradient;
-        for lane in 0..n {
-            let term = Term {
-                first: i == 0.0,
-                amplitude: octave.amplitude,
-                weight: cascade::weight(self.depth[lane], i),
-            };
-            let slopes = [
-                f64::from(gx[lane]),
-                f64::from(gy[lane]),
-                f64::from(gz[lane]),
-            ];
-            let noise = Dual {
-                value: f64::from(self.noise[lane]),
-                gradient: octave.pull(slopes),
-            };
-            let (total, rest) = add(term, noise, (self.total.at(lane), self.rest.at(lane)));
-            self.total.set(lane, total);
-            self.rest.set(lane, rest);
+#[inline(always)]
+fn add(model: Model, at: Place<'_>, sample: &Sample, total: &mut Duals, rest: &mut Duals) {
+    match model {
+        Model::Sum(basis) => add_each(
+            at,
+            sample,
+            total,
+            rest,
+            #[inline(always)]
+            |t, n, c| cascade::sum(basis, t, n, c),
+        ),
+        Model::AltitudeOne { basis, xi } => {
+            add_each(
+                at,
+                sample,
+                total,
+                rest,
+                #[inline(always)]
+                |t, n, c| cascade::altitude_one(basis, xi, t, n, c),
+            );
+        }
+        Model::AltitudeTwo { basis, xi } => {
+            add_each(
+                at,
+                sample,
+                total,
+                rest,
+                #[inline(always)]
+                |t, n, c| cascade::altitude_two(basis, xi, t, n, c),
+            );
+        }
+        Model::Ridged { offset, gain } => {
+            add_each(
+                at,
+                sample,
+                total,
+                rest,
+                #[inline(always)]
+                |t, n, c| cascade::ridged(offset, gain, t, n, c),
+            );
         }
     }
 }
 
 #[inline(always)]
+fn add_each(
+    Place { n, i, octave }: Place<'_>,
+    sample: &Sample,
+    total: &mut Duals,
+    rest: &mut Duals,
+    add: impl Fn(Term, Dual, Carried<Dual>) -> Carried<Dual>,
+) {
+    let [gx, gy, gz] = &sample.gradient;
+    let (matrix, amplitude) = (octave.matrix, octave.amplitude);
+    assert!(n <= BATCH);
+    for lane in 0..n {
+        let term = Term {
+            first: i == 0.0,
+            amplitude,
+            weight: cascade::weight(sample.depth[lane], i),
+        };
+        let slopes = [
+            f64::from(gx[lane]),
+            f64::from(gy[lane]),
+            f64::from(gz[lane]),
+        ];
+        let noise = Dual {
+            value: f64::from(sample.noise[lane]),
+            gradient: cascade::pull(&matrix, slopes),
+        };
+        let (sum, handed) = add(term, noise, (total.at(lane), rest.at(lane)));
+        total.set(lane, sum);
+        rest.set(lane, handed);
+    }
+}
+
+#[inline(always)]
 fn each(n: usize, a: &Duals, out: &mut Duals, f: impl Fn(Dual) -> Dual) {
+    assert!(n <= BATCH);
     for i in 0..n {
         out.set(i, f(a.at(i)));
     }
@@ -383,6 +417,7 @@ fn each(n: usize, a: &Duals, out: &mut Duals, f: impl Fn(Dual) -> Dual) {
 
 #[inline(always)]
 fn each3(n: usize, [a, b, c]: [&Duals; 3], out: &mut Duals, f: impl Fn(Dual, Dual, Dual) -> Dual) {
+    assert!(n <= BATCH);
     for i in 0..n {
         out.set(i, f(a.at(i), b.at(i), c.at(i)));
     }
@@ -404,6 +439,7 @@ fn unary_lanes(unary: Unary, n: usize, a: &Duals, out: &mut Duals) {
 
 #[inline(always)]
 fn binary_lanes(binary: Binary, n: usize, a: &Duals, b: &Duals, out: &mut Duals) {
+    assert!(n <= BATCH);
     for i in 0..n {
         let (a, b) = (a.at(i), b.at(i));
         let value = binary.value(a.value, b.value);
