@@ -103,8 +103,8 @@ pub(crate) fn values<S: Simd>(
         || {
             assert!(n <= BATCH);
             cells.hash(n, lattice);
-            for i in 0..n {
-                out[i] = noise::value(cells.corners_at(i), cells.offset_at(i));
+            for (i, out) in out[..n].iter_mut().enumerate() {
+                *out = noise::value(cells.corners_at(i), cells.offset_at(i));
             }
         },
     );
