@@ -189,9 +189,9 @@ fn advice(cause: &(dyn StdError + 'static)) -> Option<&'static str> {
                 io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => Some(
                     "free some space there, then run the same command again: it goes on where it was",
                 ),
-                io::ErrorKind::PermissionDenied => {
-                    Some("this user may not do that there: choose another folder, or change its permissions")
-                }
+                io::ErrorKind::PermissionDenied => Some(
+                    "this user may not do that there: choose another folder, or change its permissions",
+                ),
                 io::ErrorKind::ReadOnlyFilesystem => {
                     Some("that disk is mounted read-only: choose another folder")
                 }
@@ -216,7 +216,10 @@ mod tests {
         let error = Error::failed("cannot write the frame `a.exr`")
             .because(io::Error::from(io::ErrorKind::StorageFull));
         let said = error.to_string();
-        assert!(said.starts_with("cannot write the frame `a.exr`: "), "{said}");
+        assert!(
+            said.starts_with("cannot write the frame `a.exr`: "),
+            "{said}"
+        );
         assert!(said.contains("help: free some space"), "{said}");
         assert_eq!(error.ending().code(), 1);
     }
@@ -232,7 +235,11 @@ mod tests {
         let table = Ending::table();
         for (index, ending) in Ending::ALL.iter().enumerate() {
             assert!(table.contains(&format!("{:>3}  {}", ending.code(), ending.meaning())));
-            assert!(Ending::ALL[..index].iter().all(|other| other.code() < ending.code()));
+            assert!(
+                Ending::ALL[..index]
+                    .iter()
+                    .all(|other| other.code() < ending.code())
+            );
         }
     }
 
@@ -240,6 +247,10 @@ mod tests {
     fn a_reader_that_left_is_recognised() {
         let gone = io::Error::from(io::ErrorKind::BrokenPipe);
         assert!(Error::failed("cannot print").because(gone).is_broken_pipe());
-        assert!(!Error::failed("cannot print").because("full").is_broken_pipe());
+        assert!(
+            !Error::failed("cannot print")
+                .because("full")
+                .is_broken_pipe()
+        );
     }
 }

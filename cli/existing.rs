@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use image::{Format, FrameInfo, Formats, frame_name};
+use image::{Format, Formats, FrameInfo, frame_name};
 use model::{Digest, ImageNumber};
 
 use crate::error::Error;
@@ -57,8 +57,11 @@ pub(crate) fn survey(wanted: &Wanted<'_>, existing: Existing) -> Result<Survey, 
         match (existing, there) {
             (Existing::Replace, _) | (_, None) => survey.missing.push(image),
             (Existing::Fail, Some((_, path))) => {
-                return Err(Error::failed(format!("`{}` is there already", path.display()))
-                    .next("choose another folder with `-o`, or say `--existing skip` or `replace`"));
+                return Err(
+                    Error::failed(format!("`{}` is there already", path.display())).next(
+                        "choose another folder with `-o`, or say `--existing skip` or `replace`",
+                    ),
+                );
             }
             (Existing::Skip, Some(_)) => match wanted.look(&files)? {
                 Found::Whole(film) => survey.kept.push((image, film)),
@@ -129,7 +132,9 @@ impl Wanted<'_> {
                 self.revision
             )));
         }
-        Ok(Ok(said(&info, FILM_DIGEST).and_then(|digest| digest.parse().ok())))
+        Ok(Ok(
+            said(&info, FILM_DIGEST).and_then(|digest| digest.parse().ok())
+        ))
     }
 }
 
@@ -203,7 +208,12 @@ mod tests {
         scratch.discard().unwrap();
     }
 
-    fn look(folder: &Path, scene: Digest, revision: u32, existing: Existing) -> Result<Survey, Error> {
+    fn look(
+        folder: &Path,
+        scene: Digest,
+        revision: u32,
+        existing: Existing,
+    ) -> Result<Survey, Error> {
         let images: Vec<ImageNumber> = (0..3).map(ImageNumber).collect();
         let wanted = Wanted {
             folder,
@@ -239,7 +249,10 @@ mod tests {
         assert!(newer.to_string().contains("another revision"), "{newer}");
         std::fs::write(folder.path().join("s_0002.exr"), "no image").unwrap();
         let broken = look(folder.path(), ours, 1, Existing::Skip).unwrap_err();
-        assert!(broken.to_string().contains("no frame that can be read"), "{broken}");
+        assert!(
+            broken.to_string().contains("no frame that can be read"),
+            "{broken}"
+        );
     }
 
     #[test]

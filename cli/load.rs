@@ -52,7 +52,9 @@ impl SceneOptions {
 
     /// What the user said about the scene, as frames keep it.
     pub(crate) fn settings_json(&self) -> String {
-        let resolution = self.resolution.map(|size| format!("{}x{}", size.width, size.height));
+        let resolution = self
+            .resolution
+            .map(|size| format!("{}x{}", size.width, size.height));
         let crop = self
             .crop
             .map(|crop| format!("{},{},{},{}", crop.x0, crop.y0, crop.x1, crop.y1));
@@ -206,7 +208,10 @@ mod tests {
         ] {
             assert!(said.contains(part), "{part}: {said}");
         }
-        assert!(!said.contains('\u{1b}'), "no colours where nobody sees them");
+        assert!(
+            !said.contains('\u{1b}'),
+            "no colours where nobody sees them"
+        );
     }
 
     #[test]

@@ -22,8 +22,7 @@ pub(crate) enum Movie {
 }
 
 /// What to tell a user without ffmpeg.
-pub(crate) const HOW_TO_INSTALL: &str =
-    "no movie is made, because there is no `ffmpeg` here: install it (Debian and Ubuntu: \
+pub(crate) const HOW_TO_INSTALL: &str = "no movie is made, because there is no `ffmpeg` here: install it (Debian and Ubuntu: \
      `apt install ffmpeg`, Fedora: `dnf install ffmpeg-free`, macOS: `brew install ffmpeg`) and run \
      this again";
 
@@ -84,13 +83,7 @@ fn best_codec(encoders: &str) -> Codec {
     }
 }
 
-fn encode(
-    to: &Path,
-    codec: Codec,
-    frames: &[PathBuf],
-    fps: f64,
-    stop: &Stop,
-) -> Result<(), Error> {
+fn encode(to: &Path, codec: Codec, frames: &[PathBuf], fps: f64, stop: &Stop) -> Result<(), Error> {
     let attempt = || format!("cannot make the movie `{}`", to.display());
     let mut encoder = command(to, codec, fps)
         .spawn()
@@ -174,7 +167,10 @@ mod tests {
     fn h264_where_there_is_one() {
         let listed = " V....D libx264              libx264 H.264\n V.S... mpeg4    MPEG-4 part 2";
         assert_eq!(best_codec(listed), Codec::H264);
-        assert_eq!(best_codec(" V....D libx264rgb  x\n V.S... mpeg4  y"), Codec::Mpeg4);
+        assert_eq!(
+            best_codec(" V....D libx264rgb  x\n V.S... mpeg4  y"),
+            Codec::Mpeg4
+        );
     }
 
     #[test]

@@ -53,7 +53,12 @@ pub(crate) struct FrameOptions {
 #[derive(Args, Clone, Debug)]
 pub(crate) struct FileOptions {
     /// Formats of the frames, separated by commas: exr, png, png16, ppm.
-    #[arg(long, value_name = "LIST", default_value = "exr,png", help_heading = "Results")]
+    #[arg(
+        long,
+        value_name = "LIST",
+        default_value = "exr,png",
+        help_heading = "Results"
+    )]
     pub(crate) format: Formats,
 
     /// What to do about frames that are there already.

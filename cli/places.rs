@@ -82,9 +82,15 @@ mod tests {
             ..Surroundings::default()
         };
         let state = |around: &Surroundings| around.state_folder().unwrap();
-        assert_eq!(state(&around), PathBuf::from("/home/ada/.local/state/flyby"));
+        assert_eq!(
+            state(&around),
+            PathBuf::from("/home/ada/.local/state/flyby")
+        );
         around.xdg_state_home = Some("relative".into());
-        assert_eq!(state(&around), PathBuf::from("/home/ada/.local/state/flyby"));
+        assert_eq!(
+            state(&around),
+            PathBuf::from("/home/ada/.local/state/flyby")
+        );
         around.xdg_state_home = Some("/state".into());
         assert_eq!(state(&around), PathBuf::from("/state/flyby"));
         assert_eq!(Surroundings::default().state_folder(), None);
@@ -98,9 +104,15 @@ mod tests {
         };
         assert_eq!(
             around.config_file(),
-            Some(("/home/ada/.config/flyby/config.toml".into(), Named::ByCustom))
+            Some((
+                "/home/ada/.config/flyby/config.toml".into(),
+                Named::ByCustom
+            ))
         );
         around.config = Some("my.toml".into());
-        assert_eq!(around.config_file(), Some(("my.toml".into(), Named::ByUser)));
+        assert_eq!(
+            around.config_file(),
+            Some(("my.toml".into(), Named::ByUser))
+        );
     }
 }

@@ -212,7 +212,10 @@ fn in_file(path: &[String], key: &str, sources: &Sources) -> String {
         [] => String::new(),
         path => format!(" under `[{}]`", path.join(".")),
     };
-    format!("`{key}`{table} in the configuration `{}`", sources.file.path)
+    format!(
+        "`{key}`{table} in the configuration `{}`",
+        sources.file.path
+    )
 }
 
 /// A value of the file as the texts that the command line would hold.
@@ -300,7 +303,11 @@ fn refuse_unknown_keys(
         .collect();
     let commands: Vec<&str> = command.get_subcommands().map(Command::get_name).collect();
     for (key, value) in table {
-        let known = if value.is_table() { &commands } else { &options };
+        let known = if value.is_table() {
+            &commands
+        } else {
+            &options
+        };
         if known.contains(&key.as_str()) {
             continue;
         }
@@ -434,9 +441,15 @@ mod tests {
         assert!(unknown.contains("`thread` under `[render]` in the configuration `c.toml`"));
         assert!(unknown.contains("did you mean `threads`?"));
         let wrong = said("[render]\nthreads = 'two'", &[]);
-        assert!(wrong.contains("invalid value 'two' for '--threads"), "{wrong}");
+        assert!(
+            wrong.contains("invalid value 'two' for '--threads"),
+            "{wrong}"
+        );
         let variable = said("", &[("FLYBY_RENDER_THREADS", "many")]);
-        assert!(variable.contains("`FLYBY_RENDER_THREADS` is refused"), "{variable}");
+        assert!(
+            variable.contains("`FLYBY_RENDER_THREADS` is refused"),
+            "{variable}"
+        );
         assert!(said("[rendr]\n", &[]).contains("did you mean `render`?"));
         assert!(said("render = 3", &[]).contains("write `[render]`"));
         assert!(said("[render]\nmovie = 3", &[]).contains("true or false"));

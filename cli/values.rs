@@ -41,10 +41,7 @@ pub(crate) fn crop(text: &str) -> Result<Rect, String> {
             y1: y0.saturating_add(size.height),
         }
     } else {
-        let numbers = text
-            .split(',')
-            .map(number)
-            .collect::<Result<Vec<_>, _>>()?;
+        let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
         let [x0, y0, x1, y1] = numbers[..] else {
             return Err(form());
         };
@@ -72,7 +69,9 @@ pub(crate) fn span(text: &str) -> Result<Span, String> {
     match number.checked_mul(milliseconds) {
         // A year is more than anything here may take, and far from any overflow.
         Some(total @ 1..=31_536_000_000) => Ok(Span::from_millis(total)),
-        _ => Err(format!("`{text}` is out of range: 1 ms to a year is possible")),
+        _ => Err(format!(
+            "`{text}` is out of range: 1 ms to a year is possible"
+        )),
     }
 }
 
@@ -108,7 +107,15 @@ mod tests {
     fn parts_of_an_image() {
         assert_eq!(crop("10,20,40,60"), Ok(rect(10, 20, 40, 60)));
         assert_eq!(crop("30x40+10+20"), Ok(rect(10, 20, 40, 60)));
-        for wrong in ["10,20,10,60", "1,2,3", "30x40", "30x40+1", "9,9,1,1", "1x1+65536+0", ""] {
+        for wrong in [
+            "10,20,10,60",
+            "1,2,3",
+            "30x40",
+            "30x40+1",
+            "9,9,1,1",
+            "1x1+65536+0",
+            "",
+        ] {
             assert!(crop(wrong).is_err(), "{wrong}");
         }
     }
@@ -118,7 +125,16 @@ mod tests {
         assert_eq!(span("1500 ms"), Ok(Span::from_millis(1_500)));
         assert_eq!(span("4s"), Ok(Span::from_secs(4)));
         assert_eq!(span("2 min"), Ok(Span::from_secs(120)));
-        for wrong in ["", "4", "s", "-4 s", "4 h", "0 s", "99999999999999 min", "4.5 s"] {
+        for wrong in [
+            "",
+            "4",
+            "s",
+            "-4 s",
+            "4 h",
+            "0 s",
+            "99999999999999 min",
+            "4.5 s",
+        ] {
             assert!(span(wrong).is_err(), "{wrong}");
         }
     }

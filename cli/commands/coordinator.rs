@@ -60,9 +60,7 @@ fn not_started(error: StartError) -> Error {
         StartError::PortInUse(address) => Error::failed(format!(
             "cannot listen on {address}: another program listens there"
         ))
-        .next(
-            "perhaps a coordinator still runs: stop it, or choose another port with `--listen`",
-        ),
+        .next("perhaps a coordinator still runs: stop it, or choose another port with `--listen`"),
         error => Error::failed("cannot start the coordinator").because(error),
     }
 }

@@ -90,7 +90,10 @@ pub(crate) fn run(context: &Context, options: &Demo) -> Result<Ending, Error> {
         (None, _) => error,
     })?;
     let report = DemoReport::new(options, frames.count() as usize, done);
-    let ending = report.result.as_ref().map_or(Ending::Done, crate::farm::follow::ending);
+    let ending = report
+        .result
+        .as_ref()
+        .map_or(Ending::Done, crate::farm::follow::ending);
     output::print(context.output, &report)?;
     Ok(ending)
 }
@@ -123,7 +126,10 @@ impl Report for DemoReport {
         if let Some(movie) = &self.movie {
             writeln!(out, "the movie: {}", movie.display())?;
         }
-        writeln!(out, "one frame in numbers: flyby image info {folder}/demo_0000.exr")
+        writeln!(
+            out,
+            "one frame in numbers: flyby image info {folder}/demo_0000.exr"
+        )
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {

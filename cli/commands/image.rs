@@ -259,7 +259,14 @@ impl Part {
             "  stored {}x{}+{}+{}",
             data.width, data.height, data.x, data.y
         )?;
-        let mut table = columns(["channel", "storage", "least", "greatest", "mean", "not finite"]);
+        let mut table = columns([
+            "channel",
+            "storage",
+            "least",
+            "greatest",
+            "mean",
+            "not finite",
+        ]);
         for channel in &self.channels {
             table.add_row([
                 channel.name.clone(),
@@ -387,7 +394,13 @@ impl Report for Compared {
                 first.x, first.y, first.channel, first.a, first.b
             )?;
         }
-        if let Some(Area { x, y, width, height }) = self.bounds {
+        if let Some(Area {
+            x,
+            y,
+            width,
+            height,
+        }) = self.bounds
+        {
             writeln!(out, "all inside {width}x{height}+{x}+{y}")?;
         }
         Ok(())

@@ -97,15 +97,17 @@ async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error>
         .await
         .map_err(|status| refused("cannot list the jobs", status))?;
     let jobs = answer.into_inner().jobs.into_iter().map(Job::from);
-    output::print(context.output, &Jobs { jobs: jobs.collect() })?;
+    output::print(
+        context.output,
+        &Jobs {
+            jobs: jobs.collect(),
+        },
+    )?;
     Ok(Ending::Done)
 }
 
 /// A job and all its images, as they are now.
-async fn whole(
-    context: &Context,
-    named: &Named,
-) -> Result<(JobSummary, Vec<ImageStatus>), Error> {
+async fn whole(context: &Context, named: &Named) -> Result<(JobSummary, Vec<ImageStatus>), Error> {
     let attempt = || format!("cannot show job {}", named.job);
     let mut farm = context.connect(&named.farm).await?;
     let mut parts = farm
@@ -219,7 +221,9 @@ impl Report for Log {
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.lines.iter().try_for_each(|line| writeln!(out, "{}", line.text))
+        self.lines
+            .iter()
+            .try_for_each(|line| writeln!(out, "{}", line.text))
     }
 }
 
@@ -305,7 +309,10 @@ async fn fetch(context: &Context, options: &Fetch) -> Result<Ending, Error> {
         kept: Vec::new(),
         images_missing: summary.images.saturating_sub(summary.images_done),
     };
-    for image in images.iter().filter(|image| image.state() == ImageState::Done) {
+    for image in images
+        .iter()
+        .filter(|image| image.state() == ImageState::Done)
+    {
         for file in fetcher.image(image).await? {
             match file {
                 Fetched::New(path) => report.fetched.push(path),

@@ -38,7 +38,13 @@ pub(crate) struct Cli {
     command: Command,
 
     /// How results are printed on standard output.
-    #[arg(long, global = true, value_enum, default_value_t, help_heading = "Everywhere")]
+    #[arg(
+        long,
+        global = true,
+        value_enum,
+        default_value_t,
+        help_heading = "Everywhere"
+    )]
     output: Format,
 
     /// State folder of the farm: token, address, frames of the coordinator

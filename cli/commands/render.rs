@@ -140,7 +140,9 @@ pub(crate) fn run(context: &Context, options: &Render) -> Result<Ending, Error> 
         formats,
         tile: options.tile,
         threads: options.threads.unwrap_or_else(processors),
-        settings: options.simd.map_or_else(EvalSettings::default, |level| EvalSettings { level }),
+        settings: options
+            .simd
+            .map_or_else(EvalSettings::default, |level| EvalSettings { level }),
         metadata: metadata(&scene, &options.scene),
     };
     let outcome = render(context, &plan, &stop)?;

@@ -118,7 +118,11 @@ fn check(context: &Context, options: &SceneOptions) -> Result<Ending, Error> {
 impl Report for Check {
     fn table(&self, out: &mut dyn Write) -> io::Result<()> {
         let digest = self.digest.as_deref().unwrap_or_default();
-        writeln!(out, "{}: no mistakes; digest {digest}", self.scene.display())
+        writeln!(
+            out,
+            "{}: no mistakes; digest {digest}",
+            self.scene.display()
+        )
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {

@@ -17,9 +17,7 @@ use crate::farm::follow::ending;
 use crate::farm::link::block_on;
 use crate::farm::submit::Submission;
 use crate::farm::view::{Job, Whole};
-use crate::options::{
-    Context, Existing, FarmOptions, FileOptions, FrameOptions, SceneOptions,
-};
+use crate::options::{Context, Existing, FarmOptions, FileOptions, FrameOptions, SceneOptions};
 use crate::output::{self, Report, say};
 use crate::stop::Stop;
 use crate::values;
@@ -81,10 +79,10 @@ pub(crate) struct SubmitReport {
 /// Runs the command.
 pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> {
     if options.files.movie && options.out.is_none() {
-        return Err(
-            Error::usage("a movie is made of fetched frames, so there must be a folder for them")
-                .next("say where with `-o DIR`"),
-        );
+        return Err(Error::usage(
+            "a movie is made of fetched frames, so there must be a folder for them",
+        )
+        .next("say where with `-o DIR`"));
     }
     let scene = options.scene.load()?;
     let frames = scene.frames(options.frames.frames)?;
@@ -148,7 +146,11 @@ impl Order<'_> {
         let stem = self.stem();
         let survey = self.survey(&images, &stem)?;
         let mut report = SubmitReport::new(&self);
-        report.kept = survey.kept.iter().flat_map(|(image, _)| self.files(*image, &stem)).collect();
+        report.kept = survey
+            .kept
+            .iter()
+            .flat_map(|(image, _)| self.files(*image, &stem))
+            .collect();
         match span(&survey.missing, all.step()) {
             None => {
                 let folder = self.target.map_or(Path::new("."), |target| target.folder);
@@ -166,8 +168,13 @@ impl Order<'_> {
                 self.submit(&context, &farm, stop, &mut report)?;
             }
         }
-        if let Some(target) = self.target.filter(|target| target.movie && report.is_whole()) {
-            let frames = images.iter().map(|image| target.folder.join(frame_name(&stem, *image, Format::Png8)));
+        if let Some(target) = self
+            .target
+            .filter(|target| target.movie && report.is_whole())
+        {
+            let frames = images
+                .iter()
+                .map(|image| target.folder.join(frame_name(&stem, *image, Format::Png8)));
             let fps = self.submission.scene.description().film.fps;
             let frames: Vec<PathBuf> = frames.collect();
             report.movie = movie_of(target.folder, &stem, &frames, fps, stop)?;
@@ -211,7 +218,9 @@ impl Order<'_> {
     fn files(&self, image: ImageNumber, stem: &str) -> Vec<PathBuf> {
         let folder = self.target.map_or(Path::new(""), |target| target.folder);
         let formats = self.submission.formats.iter();
-        formats.map(|format| folder.join(frame_name(stem, image, format))).collect()
+        formats
+            .map(|format| folder.join(frame_name(stem, image, format)))
+            .collect()
     }
 
     fn survey(&self, images: &[ImageNumber], stem: &str) -> Result<Survey, Error> {
@@ -308,7 +317,8 @@ mod tests {
     #[test]
     fn what_is_missing_is_one_range() {
         let images = |numbers: &[u32]| numbers.iter().copied().map(ImageNumber).collect::<Vec<_>>();
-        let text = |numbers: &[u32], step| span(&images(numbers), step).map(|range| range.to_string());
+        let text =
+            |numbers: &[u32], step| span(&images(numbers), step).map(|range| range.to_string());
         assert_eq!(text(&[], 1), None);
         assert_eq!(text(&[7], 1), Some("7".into()));
         assert_eq!(text(&[3, 4, 9], 1), Some("3..10".into()));

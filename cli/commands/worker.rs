@@ -183,7 +183,9 @@ fn memory_bytes() -> u64 {
 }
 
 fn total_memory(meminfo: &str) -> Option<u64> {
-    let line = meminfo.lines().find_map(|line| line.strip_prefix("MemTotal:"))?;
+    let line = meminfo
+        .lines()
+        .find_map(|line| line.strip_prefix("MemTotal:"))?;
     let kibibytes: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     kibibytes.checked_mul(1024)
 }
@@ -197,7 +199,11 @@ mod tests {
         let state = tempfile::tempdir().unwrap();
         let first = Home::take(state.path(), "left").unwrap();
         let second = Home::take(state.path(), "left").err().unwrap();
-        assert!(second.to_string().contains("another worker that is called `left`"));
+        assert!(
+            second
+                .to_string()
+                .contains("another worker that is called `left`")
+        );
         drop(first);
         assert!(Home::take(state.path(), "left").is_ok());
     }

@@ -118,7 +118,12 @@ impl Fetcher<'_> {
     }
 
     /// Downloads a file to `part`; what is left of a failure is removed.
-    async fn download(&self, image: &ImageStatus, file: &FrameFile, part: &Path) -> Result<(), Error> {
+    async fn download(
+        &self,
+        image: &ImageStatus,
+        file: &FrameFile,
+        part: &Path,
+    ) -> Result<(), Error> {
         let attempt = || {
             let name = wire::convert::sentence(&file.name, 200);
             format!("cannot fetch `{name}` of job {}", self.job)
@@ -130,8 +135,9 @@ impl Fetcher<'_> {
                 Ok(()) => return Ok(()),
                 Err(Broken::Here(error)) => {
                     let _ = fs::remove_file(part);
-                    return Err(Error::failed(format!("cannot write `{}`", part.display()))
-                        .because(error));
+                    return Err(
+                        Error::failed(format!("cannot write `{}`", part.display())).because(error)
+                    );
                 }
                 Err(Broken::There(error)) => error,
                 Err(Broken::Asked(failure)) if failure.retry == Retry::Never => {
@@ -156,7 +162,11 @@ impl Fetcher<'_> {
         file: &FrameFile,
         part: &Path,
     ) -> Result<(), Broken> {
-        let mut farm = self.context.connect(self.farm).await.map_err(Broken::There)?;
+        let mut farm = self
+            .context
+            .connect(self.farm)
+            .await
+            .map_err(Broken::There)?;
         let request = FetchFrameRequest {
             job: self.job.0,
             image: image.image,
@@ -215,7 +225,17 @@ mod tests {
     #[test]
     fn a_coordinator_cannot_choose_the_folder() {
         assert_eq!(plain("flyby_0007.exr"), Some("flyby_0007.exr"));
-        for bad in ["", ".", "..", "../x", "/etc/passwd", "a/b", ".hidden", "a\nb", "a\\b"] {
+        for bad in [
+            "",
+            ".",
+            "..",
+            "../x",
+            "/etc/passwd",
+            "a/b",
+            ".hidden",
+            "a\nb",
+            "a\\b",
+        ] {
             assert_eq!(plain(bad), None, "{bad}");
         }
     }

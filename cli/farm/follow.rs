@@ -97,7 +97,11 @@ impl Follower<'_> {
         let mut updates = stream.map_err(|status| lost(status.into()))?.into_inner();
         known.reached = true;
         let mut whole = false;
-        while let Some(update) = updates.message().await.map_err(|status| lost(status.into()))? {
+        while let Some(update) = updates
+            .message()
+            .await
+            .map_err(|status| lost(status.into()))?
+        {
             *tries = 0;
             whole |= self.take(known, update).map_err(|bad| lost(bad.into()))?;
             if whole && known.is_over() {

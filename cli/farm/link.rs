@@ -50,11 +50,13 @@ impl Context {
     /// Opens a connection to the coordinator.
     pub(crate) async fn connect(&self, options: &FarmOptions) -> Result<Farm, Error> {
         let address = self.address(options)?;
-        wire::link::farm(address, self.token()?).await.map_err(|error| {
-            Error::unreachable(format!("no coordinator answers at {address}"))
+        wire::link::farm(address, self.token()?)
+            .await
+            .map_err(|error| {
+                Error::unreachable(format!("no coordinator answers at {address}"))
                 .because(error)
                 .next("start one with `flyby coordinator`, or say where it is with `--coordinator`")
-        })
+            })
     }
 }
 
@@ -72,10 +74,9 @@ fn not_found(error: place::NotFound) -> Error {
 pub(crate) fn refused(attempt: impl Into<String>, failure: impl Into<Failure>) -> Error {
     let failure = failure.into();
     let ending = match failure.kind {
-        ErrorKind::BadRequest
-        | ErrorKind::BadScene
-        | ErrorKind::NotFound
-        | ErrorKind::Conflict => Ending::Usage,
+        ErrorKind::BadRequest | ErrorKind::BadScene | ErrorKind::NotFound | ErrorKind::Conflict => {
+            Ending::Usage
+        }
         ErrorKind::Unauthenticated
         | ErrorKind::WrongProtocol
         | ErrorKind::WrongRevision

@@ -194,7 +194,13 @@ impl Drop for Process {
 }
 
 fn coordinator(state: &Path, stop: &Stop) -> Result<(Process, SocketAddr), Error> {
-    let arguments = ["coordinator", "--listen", "127.0.0.1:0", "--liveness", "4 s"];
+    let arguments = [
+        "coordinator",
+        "--listen",
+        "127.0.0.1:0",
+        "--liveness",
+        "4 s",
+    ];
     let mut process = Process::start("coordinator".to_owned(), state, &arguments)?;
     let stdout = process.child.stdout.take().expect("it is piped");
     let (tell, heard) = mpsc::channel();

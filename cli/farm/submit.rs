@@ -37,10 +37,9 @@ impl Submission<'_> {
         farm: &FarmOptions,
     ) -> Result<JobId, Error> {
         let mut id = [0; 16];
-        getrandom::fill(&mut id)
-            .map_err(|error| {
-                Error::failed("cannot draw a number for the job").because(error.to_string())
-            })?;
+        getrandom::fill(&mut id).map_err(|error| {
+            Error::failed("cannot draw a number for the job").because(error.to_string())
+        })?;
         let parts = self.parts(SubmissionId(u128::from_ne_bytes(id)));
         let mut farm = context.connect(farm).await?;
         let answer = farm
@@ -62,7 +61,11 @@ impl Submission<'_> {
                 width: tile.width,
                 height: tile.height,
             }),
-            formats: self.formats.iter().map(|format| wire_format(format).into()).collect(),
+            formats: self
+                .formats
+                .iter()
+                .map(|format| wire_format(format).into())
+                .collect(),
             settings_json: self.settings_json.clone(),
         };
         let description = self.scene.bytes.chunks(CHUNK_BYTES);

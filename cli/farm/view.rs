@@ -206,7 +206,9 @@ impl From<proto::JobSummary> for Job {
                 Some(Ok(frames)) => frames.to_string(),
                 _ => String::new(),
             },
-            tile: job.tile.map(|tile| format!("{}x{}", tile.width, tile.height)),
+            tile: job
+                .tile
+                .map(|tile| format!("{}x{}", tile.width, tile.height)),
             scene_digest: hex(&job.description_digest).unwrap_or_default(),
             counters: job
                 .counters
@@ -323,7 +325,16 @@ impl Report for Jobs {
         if self.jobs.is_empty() {
             return writeln!(out, "There are no jobs.");
         }
-        let header = ["job", "name", "state", "frames", "done", "failed", "pixels", "submitted"];
+        let header = [
+            "job",
+            "name",
+            "state",
+            "frames",
+            "done",
+            "failed",
+            "pixels",
+            "submitted",
+        ];
         let mut table = columns(header);
         for job in &self.jobs {
             table.add_row([
@@ -341,7 +352,9 @@ impl Report for Jobs {
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.jobs.iter().try_for_each(|job| writeln!(out, "{}", job.job))
+        self.jobs
+            .iter()
+            .try_for_each(|job| writeln!(out, "{}", job.job))
     }
 }
 
@@ -419,7 +432,9 @@ impl Report for Workers {
         if self.workers.is_empty() {
             return writeln!(out, "There are no workers: start one with `flyby worker`.");
         }
-        let header = ["worker", "name", "state", "threads", "simd", "tiles", "blocks", "heard"];
+        let header = [
+            "worker", "name", "state", "threads", "simd", "tiles", "blocks", "heard",
+        ];
         let mut table = columns(header);
         for worker in &self.workers {
             table.add_row([

@@ -163,7 +163,9 @@ pub(crate) fn render(
         return Err(error);
     }
     if outcome.frames.len() < plan.images.len() {
-        return Err(Error::interrupted("interrupted before every frame was done"));
+        return Err(Error::interrupted(
+            "interrupted before every frame was done",
+        ));
     }
     outcome.frames.sort_by_key(|(image, _)| *image);
     outcome.wall = started.elapsed();
@@ -247,7 +249,9 @@ impl Shared<'_> {
     fn open(&self, image: ImageNumber, events: &Sender<Event>) -> Result<Option<Work>, Error> {
         let plan = self.plan;
         let renderer = ImageRenderer::new(plan.description, plan.assets, image, plan.settings)
-            .map_err(|error| Error::failed(format!("cannot render frame {image}")).because(error))?;
+            .map_err(|error| {
+                Error::failed(format!("cannot render frame {image}")).because(error)
+            })?;
         let film = &plan.description.film;
         let identity = ScratchIdentity {
             scene: plan.digest,
@@ -269,7 +273,8 @@ impl Shared<'_> {
         }
         let remaining = scratch.remaining();
         let squares = film.window.blocks().count().saturating_sub(remaining.len());
-        self.blocks_found.fetch_add(squares as u64, Ordering::Relaxed);
+        self.blocks_found
+            .fetch_add(squares as u64, Ordering::Relaxed);
         let blocks = in_tiles(remaining, film.window, plan.tile);
         let work = Work {
             image,
@@ -295,7 +300,10 @@ impl Shared<'_> {
         self.pixels.fetch_add(block.area(), Ordering::Relaxed);
         self.blocks.fetch_add(1, Ordering::Relaxed);
         self.rays.fetch_add(counts.rays, Ordering::Relaxed);
-        *work.counts.lock().unwrap_or_else(std::sync::PoisonError::into_inner) += counts;
+        *work
+            .counts
+            .lock()
+            .unwrap_or_else(std::sync::PoisonError::into_inner) += counts;
         Ok(())
     }
 

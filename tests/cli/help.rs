@@ -20,10 +20,15 @@ fn help_names_every_command_and_every_exit_code() {
     for command in COMMANDS {
         assert!(help.contains(command), "{command}: {help}");
         let (page, _) = place.ends(0, &[command, "--help"]);
-        assert!(page.contains("--output") && page.contains("--state"), "{page}");
+        assert!(
+            page.contains("--output") && page.contains("--state"),
+            "{page}"
+        );
     }
     assert!(help.contains("Exit codes:"), "{help}");
-    for code in ["  0  ", "  1  ", "  2  ", "  3  ", "  4  ", "  5  ", "130  "] {
+    for code in [
+        "  0  ", "  1  ", "  2  ", "  3  ", "  4  ", "  5  ", "130  ",
+    ] {
         assert!(help.contains(code), "{code}: {help}");
     }
 }
@@ -50,7 +55,10 @@ fn completions_and_manual_pages() {
     let place = Place::new();
     for shell in ["bash", "zsh", "fish"] {
         let (script, _) = place.ends(0, &["completions", shell]);
-        assert!(script.contains("flyby") && script.contains("coordinator"), "{shell}");
+        assert!(
+            script.contains("flyby") && script.contains("coordinator"),
+            "{shell}"
+        );
     }
     place.ends(0, &["man", "pages"]);
     let page = std::fs::read_to_string(place.path("pages/flyby-render.1")).unwrap();

@@ -11,7 +11,19 @@ fn frames() -> Place {
     place.write("ball.toml", SPHERE);
     place.ends(0, &["render", "ball.toml", "--frames", "0..2", "-o", "a"]);
     place.ends(0, &["render", "ball.toml", "--frames", "0", "-o", "b"]);
-    place.ends(0, &["render", "ball.toml", "--frames", "0", "--rays", "2", "-o", "c"]);
+    place.ends(
+        0,
+        &[
+            "render",
+            "ball.toml",
+            "--frames",
+            "0",
+            "--rays",
+            "2",
+            "-o",
+            "c",
+        ],
+    );
     place
 }
 
@@ -28,16 +40,25 @@ fn equal_frames_are_equal_and_others_differ_with_code_4() {
     assert_eq!(digest("a/ball_0000.png"), digest("b/ball_0000.png"));
     assert_ne!(digest("a/ball_0000.exr"), digest("c/ball_0000.exr"));
 
-    let (same, _) = place.ends(0, &["image", "compare", "a/ball_0000.exr", "b/ball_0000.exr"]);
+    let (same, _) = place.ends(
+        0,
+        &["image", "compare", "a/ball_0000.exr", "b/ball_0000.exr"],
+    );
     assert!(same.contains("equal"), "{same}");
     let arguments = ["image", "compare", "a/ball_0000.exr", "c/ball_0000.exr"];
     let (other, _) = place.ends(4, &arguments);
-    assert!(other.contains("different") && other.contains("column"), "{other}");
+    assert!(
+        other.contains("different") && other.contains("column"),
+        "{other}"
+    );
     let (json, _) = place.ends(4, &[&arguments[..], &["--output", "json"]].concat());
     let json: Value = serde_json::from_str(&json).unwrap();
     assert_eq!(json["equal"], false);
     assert!(json["differing_pixels"].as_u64() > Some(0), "{json}");
-    place.ends(4, &["image", "compare", "a/ball_0000.exr", "a/ball_0000.png"]);
+    place.ends(
+        4,
+        &["image", "compare", "a/ball_0000.exr", "a/ball_0000.png"],
+    );
 }
 
 #[test]
@@ -48,12 +69,18 @@ fn a_frame_says_what_it_shows() {
     let (digest, _) = place.ends(0, &["scene", "check", "ball.toml", "--output", "quiet"]);
     assert_eq!(info["scene_digest"], digest.trim());
     assert_eq!(info["film_digest"].as_str().map(str::len), Some(64));
-    assert_eq!((&info["parts"][0]["width"], &info["parts"][0]["height"]), (&40.into(), &30.into()));
+    assert_eq!(
+        (&info["parts"][0]["width"], &info["parts"][0]["height"]),
+        (&40.into(), &30.into())
+    );
     let statistics: Value =
         serde_json::from_str(info["metadata"]["flyby:statistics"].as_str().unwrap()).unwrap();
     assert_eq!(statistics["pixels"], 40 * 30);
     let (table, _) = place.ends(0, &["image", "info", "a/ball_0001.exr"]);
-    assert!(table.contains("N.X") && table.contains("flyby:sceneDigest"), "{table}");
+    assert!(
+        table.contains("N.X") && table.contains("flyby:sceneDigest"),
+        "{table}"
+    );
 }
 
 #[test]

@@ -56,7 +56,11 @@ pub(crate) fn ends(mut command: Command, code: i32) -> (String, String) {
     let output = command.output().unwrap();
     let text = |bytes: &[u8]| String::from_utf8(bytes.to_vec()).unwrap();
     let (out, err) = (text(&output.stdout), text(&output.stderr));
-    assert_eq!(output.status.code(), Some(code), "{command:?}\n{out}\n{err}");
+    assert_eq!(
+        output.status.code(),
+        Some(code),
+        "{command:?}\n{out}\n{err}"
+    );
     assert!(!err.contains("panicked at"), "{err}");
     (out, err)
 }

@@ -23,7 +23,17 @@ fn files(place: &Place, folder: &str) -> Vec<String> {
 #[test]
 fn frames_lie_in_a_folder_of_the_scene_s_name() {
     let place = ball();
-    let (out, said) = place.ends(0, &["render", "ball.toml", "--frames", "1..3", "--format", "exr,ppm"]);
+    let (out, said) = place.ends(
+        0,
+        &[
+            "render",
+            "ball.toml",
+            "--frames",
+            "1..3",
+            "--format",
+            "exr,ppm",
+        ],
+    );
     assert!(out.contains("2 rendered, 0 kept"), "{out}");
     assert!(said.is_empty(), "no bar where there is no terminal: {said}");
     let names = ["ball_0001.exr", "ball_0002.exr", "ball_1.ppm", "ball_2.ppm"];
@@ -33,7 +43,12 @@ fn frames_lie_in_a_folder_of_the_scene_s_name() {
 #[test]
 fn a_second_run_keeps_replaces_or_stops() {
     let place = ball();
-    let run = |code, more: &[&str]| place.ends(code, &[&["render", "ball.toml", "--output", "json"], more].concat());
+    let run = |code, more: &[&str]| {
+        place.ends(
+            code,
+            &[&["render", "ball.toml", "--output", "json"], more].concat(),
+        )
+    };
     let report = |out: String| -> (u64, u64) {
         let report: Value = serde_json::from_str(&out).unwrap();
         let number = |name: &str| report[name].as_u64().unwrap();
@@ -42,7 +57,10 @@ fn a_second_run_keeps_replaces_or_stops() {
     assert_eq!(report(run(0, &["--frames", "0..2"]).0), (2, 0));
     let (out, said) = run(0, &[]);
     assert_eq!(report(out), (1, 2), "the third frame only");
-    assert!(said.contains("already") && said.contains("--existing replace"), "{said}");
+    assert!(
+        said.contains("already") && said.contains("--existing replace"),
+        "{said}"
+    );
     assert_eq!(report(run(0, &["--existing", "replace"]).0), (3, 0));
     let (_, said) = run(1, &["--existing", "fail"]);
     assert!(said.contains("is there already"), "{said}");
@@ -58,12 +76,23 @@ fn pixels_do_not_depend_on_how_they_are_computed() {
         let (out, _) = place.ends(0, &[&words[..], more].concat());
         let report: Value = serde_json::from_str(&out).unwrap();
         let frames = report["frames"].as_array().unwrap().iter();
-        frames.map(|frame| frame["film_digest"].as_str().unwrap().to_owned()).collect()
+        frames
+            .map(|frame| frame["film_digest"].as_str().unwrap().to_owned())
+            .collect()
     };
     let reference = digests("a", &[]);
     assert_eq!(reference.len(), 3);
-    assert_eq!(digests("b", &["--threads", "1", "--tile", "7x5", "--simd", "scalar"]), reference);
-    assert_eq!(digests("c", &["--threads", "5", "--tile", "33x64"]), reference);
+    assert_eq!(
+        digests(
+            "b",
+            &["--threads", "1", "--tile", "7x5", "--simd", "scalar"]
+        ),
+        reference
+    );
+    assert_eq!(
+        digests("c", &["--threads", "5", "--tile", "33x64"]),
+        reference
+    );
 }
 
 #[test]
@@ -86,10 +115,18 @@ fn what_makes_no_sense_is_refused_before_anything_is_made() {
 #[test]
 fn without_a_coordinator_jobs_are_out_of_reach() {
     let place = ball();
-    for command in [&["job", "list"][..], &["worker"], &["worker", "list"], &["submit", "ball.toml"]] {
+    for command in [
+        &["job", "list"][..],
+        &["worker"],
+        &["worker", "list"],
+        &["submit", "ball.toml"],
+    ] {
         let (_, said) = place.ends(3, command);
         assert!(said.contains("flyby coordinator"), "{command:?}: {said}");
     }
     let (_, said) = place.ends(2, &["coordinator", "--listen", "0.0.0.0:0"]);
-    assert!(said.contains("loopback") || said.contains("127.0.0.1"), "{said}");
+    assert!(
+        said.contains("loopback") || said.contains("127.0.0.1"),
+        "{said}"
+    );
 }

@@ -46,23 +46,41 @@ fn a_good_scene_is_named_by_its_digest() {
     assert!(out.contains("no mistakes"), "{out}");
     let (digest, _) = place.ends(0, &["scene", "check", "ball.toml", "--output", "quiet"]);
     assert_eq!(digest.trim().len(), 64, "{digest}");
-    let (other, _) = place.ends(0, &["scene", "check", "ball.toml", "--rays", "2", "--output", "quiet"]);
-    assert_ne!(digest, other, "rays change pixels, so they change the digest");
+    let (other, _) = place.ends(
+        0,
+        &[
+            "scene",
+            "check",
+            "ball.toml",
+            "--rays",
+            "2",
+            "--output",
+            "quiet",
+        ],
+    );
+    assert_ne!(
+        digest, other,
+        "rays change pixels, so they change the digest"
+    );
 }
 
 #[test]
 fn every_mistake_is_shown_with_its_place() {
     let place = Place::new();
-    let broken = SPHERE
-        .replace("resolution", "resolutoin")
-        .replace("\"40 deg\"\n\n[camera.fixed]", "\"40 km\"\n\n[camera.fixed]");
+    let broken = SPHERE.replace("resolution", "resolutoin").replace(
+        "\"40 deg\"\n\n[camera.fixed]",
+        "\"40 km\"\n\n[camera.fixed]",
+    );
     place.write("broken.toml", &broken);
     let line = |text: &str| broken.lines().position(|line| line.contains(text)).unwrap() + 1;
     let (out, said) = place.ends(2, &["scene", "check", "broken.toml"]);
     assert!(out.is_empty(), "{out}");
     assert!(said.contains("resolution"), "the suggestion: {said}");
     for text in ["resolutoin", "40 km"] {
-        assert!(said.contains(&format!("broken.toml:{}:", line(text))), "{text}: {said}");
+        assert!(
+            said.contains(&format!("broken.toml:{}:", line(text))),
+            "{text}: {said}"
+        );
     }
 
     let (json, _) = place.ends(2, &["scene", "check", "broken.toml", "--output", "json"]);
@@ -82,7 +100,10 @@ fn every_mistake_is_shown_with_its_place() {
 fn a_scene_that_cannot_be_read_is_a_failure() {
     let place = Place::new();
     let (_, said) = place.ends(1, &["scene", "check", "nowhere.toml"]);
-    assert!(said.contains("nowhere.toml") && said.contains("No such file"), "{said}");
+    assert!(
+        said.contains("nowhere.toml") && said.contains("No such file"),
+        "{said}"
+    );
     place.ends(1, &["scene", "show", "."]);
 }
 

@@ -15,12 +15,19 @@ fn a_flag_counts_before_the_environment_before_the_file() {
         command
     };
     // All the same to a frame that is not there: each is read and taken.
-    for (environment, flag) in [(None, &[][..]), (Some("quiet"), &[]), (Some("quiet"), &["--output", "table"])] {
+    for (environment, flag) in [
+        (None, &[][..]),
+        (Some("quiet"), &[]),
+        (Some("quiet"), &["--output", "table"]),
+    ] {
         let (_, said) = ends(listed(environment, flag), 1);
         assert!(said.contains("nowhere.exr"), "{said}");
     }
     let (_, said) = ends(listed(Some("loud"), &[]), 2);
-    assert!(said.contains("FLYBY_OUTPUT") && said.contains("loud"), "{said}");
+    assert!(
+        said.contains("FLYBY_OUTPUT") && said.contains("loud"),
+        "{said}"
+    );
 }
 
 #[test]
@@ -35,7 +42,9 @@ fn the_environment_decides_how_results_are_printed() {
 
     place.write("c.toml", "[scene.show]\nresolution = '64x48'\n");
     let mut command = place.flyby(&["scene", "show", "--output", "json"]);
-    command.arg(&scene).env("FLYBY_CONFIG", place.path("c.toml"));
+    command
+        .arg(&scene)
+        .env("FLYBY_CONFIG", place.path("c.toml"));
     let (shown, _) = ends(command, 0);
     let shown: serde_json::Value = serde_json::from_str(&shown).unwrap();
     assert_eq!(shown["resolution"], serde_json::json!([64, 48]));
@@ -51,7 +60,10 @@ fn mistakes_in_the_configuration_are_named() {
         ends(command, 2).1
     };
     let unknown = said("[render]\nthread = 2\n");
-    assert!(unknown.contains("thread") && unknown.contains("did you mean `threads`?"), "{unknown}");
+    assert!(
+        unknown.contains("thread") && unknown.contains("did you mean `threads`?"),
+        "{unknown}"
+    );
     assert!(said("[render]\nthreads = 'many'\n").contains("many"));
     assert!(said("[render\n").contains("is no TOML"));
 
