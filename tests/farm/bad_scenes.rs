@@ -149,21 +149,21 @@ fn scripts_that_mean_harm() {
         // 24 GiB in a moment, where only operations are counted.
         "let a = [0]; loop { a += a } 1",
         "let a = []; loop { a.push([0, 0, 0, 0]) } 1",
-        "let s = 'x'; loop { s += s } 1",
+        "let s = \"x\"; loop { s += s } 1",
         "let m = #{}; let i = 0; loop { m[`k${i}`] = [0]; i += 1 } 1",
         "fn f(x) { f(x + 1) } f(0)",
         "let f = length(p); for i in 0..1000000000 { f += noise(i*p) } f",
         "let f = noise(p); loop { f = f*f } f",
-        "eval('1')",
-        "import 'os' as os; 1",
-        "print('x'); length(p) - 1",
+        "eval(\"1\")",
+        "import \"os\" as os; 1",
+        "print(\"x\"); length(p) - 1",
     ];
     for script in hostile {
-        let scene = with("field", &format!("field = \"{script}\""));
+        let scene = with("field", &format!("field = '''{script}'''"));
         check(&place, &scene).refused(2, &["scene.toml:12:"]);
     }
     let deep = format!("{}p.x{}", "abs(".repeat(100_000), ")".repeat(100_000));
-    check(&place, &with("field", &format!("field = \"{deep}\""))).refused(2, &["scene.toml:12:"]);
+    check(&place, &with("field", &format!("field = '{deep}'"))).refused(2, &["scene.toml:12:"]);
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! A cancelled job ends, and leaves nothing behind but its finished frames.
 
-use crate::harness::scenes::{FLYBY, SLOW, SMALL};
+use crate::harness::scenes::{ENDLESS, FLYBY, TINY};
 use crate::harness::{Farm, wait};
 
 #[test]
 fn nothing_half_done_is_left() {
     let farm = Farm::of_workers(1);
-    let job = farm.submit(&[&[FLYBY, "--frames", "0..500"], &SLOW[..]].concat());
+    let job = farm.submit(&ENDLESS);
     farm.wait_acknowledged(job, 5);
     assert!(
         !farm.place.files("state/jobs").is_empty(),
@@ -27,7 +27,7 @@ fn nothing_half_done_is_left() {
 
     // Cancelling again changes nothing, and the worker is free for others.
     farm.flyby(["job", "cancel", &job.to_string()]).ok();
-    let next = farm.submit(&[&[FLYBY, "--frames", "0"], &SMALL[..]].concat());
+    let next = farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat());
     farm.wait_done(next);
 }
 
@@ -35,7 +35,7 @@ fn nothing_half_done_is_left() {
 fn waiting_for_a_job_that_is_cancelled_is_told_by_the_exit_code() {
     let farm = Farm::of_workers(0);
     let job = farm
-        .submit(&[&[FLYBY, "--frames", "0"], &SMALL[..]].concat())
+        .submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat())
         .to_string();
     let mut watch = farm.place.start("watch", ["job", "watch", &job]);
     farm.flyby(["job", "cancel", &job]).ok();

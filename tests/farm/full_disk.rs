@@ -1,14 +1,15 @@
 //! A full disk: the sentence says so, nothing half-written is taken for a frame, and with
 //! space again the work goes on.
 
-use crate::harness::scenes::{FLYBY, SMALL, film_digests, rendered};
+use crate::harness::scenes::{FLYBY, film_digests, rendered};
 use crate::harness::{Farm, Job, Place, need, wait};
 
 /// Mounts a tmpfs of `$1` on `$2`, then becomes the rest of its words.
 const ON_SMALL_DISK: &str =
     "mount -t tmpfs -o size=\"$1\" flyby-test \"$2\" && shift 2 && exec \"$@\"";
 
-const IMAGE: [&str; 2] = ["--frames", "0"];
+/// One image, whose pixels alone are larger than the disk.
+const IMAGE: [&str; 6] = ["--frames", "0", "--resolution", "200x150", "--rays", "1"];
 
 #[test]
 fn render_says_so_and_goes_on_when_there_is_space() {
@@ -43,7 +44,7 @@ fn render_says_so_and_goes_on_when_there_is_space() {
         &["sh", "-c", &script, "sh"],
     ]
     .concat();
-    let arguments = [&["render", FLYBY, "--out", "out"], &SMALL[..], &IMAGE].concat();
+    let arguments = [&["render", FLYBY, "--out", "out"], &IMAGE[..]].concat();
     let outcome = place.run(place.wrapped(&wrapper, arguments), wait::LIMIT);
     assert!(outcome.stdout.contains("first: 1\n"), "{outcome}");
     assert!(
@@ -52,7 +53,7 @@ fn render_says_so_and_goes_on_when_there_is_space() {
     );
     assert!(outcome.stdout.contains("again: 0\n"), "{outcome}");
     assert!(outcome.stderr.contains("no space left"), "{outcome}");
-    let reference = rendered(&place, "reference", &[&SMALL[..], &IMAGE].concat());
+    let reference = rendered(&place, "reference", &IMAGE);
     assert_eq!(film_digests(&place, "kept"), reference);
 }
 
@@ -75,7 +76,7 @@ fn a_coordinator_fails_that_image_with_the_reason_and_takes_the_next_job() {
     let mut farm = Farm::wrapped(place, &[mounting, &disk].concat(), &[]);
     farm.worker(&["--threads", "1"]);
 
-    let job = farm.submit(&[&[FLYBY], &SMALL[..], &IMAGE].concat());
+    let job = farm.submit(&[&[FLYBY], &IMAGE[..]].concat());
     let failed = farm.wait_until(job, "the job is over", Job::is_over);
     assert_eq!(failed.state(), "failed", "{failed:?}");
     let reason = failed.images()[0]["error"].as_str().unwrap();

@@ -13,7 +13,7 @@ use wire::{BlockHeader, Failure};
 
 use crate::harness::Farm;
 use crate::harness::raw::{self, Raw};
-use crate::harness::scenes::{FLYBY, SMALL};
+use crate::harness::scenes::{FLYBY, TINY};
 
 fn token(farm: &Farm) -> String {
     std::fs::read_to_string(farm.place.state().join("token")).unwrap()
@@ -25,7 +25,7 @@ fn connect(farm: &Farm) -> Raw {
 
 /// Submits a job of one small image.
 fn submit(farm: &Farm) -> u64 {
-    farm.submit(&[&[FLYBY, "--frames", "0", "--tile", "40x30"], &SMALL[..]].concat())
+    farm.submit(&[&[FLYBY, "--frames", "0", "--tile", "40x30"], &TINY[..]].concat())
 }
 
 /// After all that was said, a job still gets done.

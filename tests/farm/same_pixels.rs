@@ -1,66 +1,77 @@
-//! The same pixels from one process and from farms, whatever the tiles, threads and SIMD level.
+//! The same pixels from one process and from farms, whatever the tiles, threads and SIMD level:
+//! so no seam can show where tiles meet.
+
+use std::process::Command;
 
 use render::SimdLevel;
 
-use crate::harness::Farm;
-use crate::harness::Place;
-use crate::harness::scenes::{FLYBY, SMALL, film_digests, rendered};
+use crate::harness::scenes::{FLYBY, TINY, film_digests, rendered, small};
+use crate::harness::{Farm, Place, need, wait};
 
 const TILES: [&str; 3] = ["64x64", "40x60", "200x25"];
 
-/// Images 0 and 1, small, and `more`.
-fn two_small_images<'a>(more: &[&'a str]) -> Vec<&'a str> {
-    [&SMALL[..], &["--frames", "0..2"], more].concat()
-}
-
-/// What everything below is compared with: tiles as they come, threads as they come.
-fn reference(place: &Place) -> Vec<String> {
-    let reference = rendered(place, "reference", &two_small_images(&[]));
-    assert_eq!(reference.len(), 2);
-    assert_ne!(reference[0], reference[1], "the camera moves");
-    reference
+/// Renders [`small`]'s images and compares.
+#[track_caller]
+fn renders_the_same(place: &Place, level: SimdLevel, threads: &str, tile: &str) {
+    let level = level.to_string();
+    let how = ["--simd", &level, "--threads", threads, "--tile", tile];
+    let digests = rendered(place, &how.concat(), &small().with(&how));
+    assert_eq!(digests, small().digests, "{how:?}");
 }
 
 #[test]
-fn in_one_process_at_every_split_thread_count_and_simd_level() {
+fn the_camera_moves() {
+    let digests = &small().digests;
+    assert_eq!(digests.len(), 2);
+    assert_ne!(digests[0], digests[1]);
+}
+
+#[test]
+fn in_one_process_at_each_split_thread_count_and_simd_level() {
     let place = Place::new();
-    let reference = reference(&place);
+    let splits = TILES.iter().flat_map(|tile| [("1", tile), ("2", tile)]);
+    let levels = SimdLevel::all_available();
+    for (level, (threads, tile)) in levels.iter().cycle().zip(splits) {
+        renders_the_same(&place, *level, threads, tile);
+    }
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn in_one_process_at_every_combination_of_them() {
+    let place = Place::new();
     for level in SimdLevel::all_available() {
-        let level = level.to_string();
         for threads in ["1", "2"] {
             for tile in TILES {
-                let how = ["--simd", &level, "--threads", threads, "--tile", tile];
-                let digests = rendered(&place, &how.concat(), &two_small_images(&how));
-                assert_eq!(digests, reference, "{how:?}");
+                renders_the_same(&place, level, threads, tile);
             }
         }
     }
 }
 
 #[test]
-fn on_farms_of_one_and_of_three_workers_at_every_split() {
-    for workers in [1, 3] {
-        let farm = Farm::of_workers(workers);
-        let reference = reference(&farm.place);
-        for tile in TILES {
-            let arguments = [&[FLYBY, "--tile", tile], &two_small_images(&[])[..]].concat();
-            let job = farm.submit(&arguments);
-            let done = farm.wait_done(job);
-            assert_eq!(
-                done.film_digests(),
-                reference,
-                "{workers} workers, tiles {tile}"
-            );
-            assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+fn on_a_farm_of_one_worker_at_each_split() {
+    on_a_farm(1);
+}
 
-            let (job, out) = (job.to_string(), format!("fetched-{tile}"));
-            farm.flyby(["job", "fetch", &job, "--out", &out]).ok();
-            assert_eq!(
-                film_digests(&farm.place, &out),
-                reference,
-                "the fetched files"
-            );
-        }
+#[test]
+fn on_a_farm_of_three_workers_at_each_split() {
+    on_a_farm(3);
+}
+
+fn on_a_farm(workers: usize) {
+    let farm = Farm::of_workers(workers);
+    farm.wait_connected(workers);
+    for tile in TILES {
+        let job = farm.submit(&small().with(&[FLYBY, "--tile", tile]));
+        let done = farm.wait_done(job);
+        assert_eq!(done.film_digests(), small().digests, "tiles {tile}");
+        assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+
+        let (job, out) = (job.to_string(), format!("fetched-{tile}"));
+        farm.flyby(["job", "fetch", &job, "--out", &out]).ok();
+        let fetched = film_digests(&farm.place, &out);
+        assert_eq!(fetched, small().digests, "the fetched files");
     }
 }
 
@@ -73,31 +84,37 @@ fn on_workers_of_different_threads_and_simd_levels_at_once() {
         farm.worker(&["--simd", &level, "--threads", threads]);
     }
     farm.wait_connected(2);
-    let arguments = [&[FLYBY, "--tile", "40x30"], &two_small_images(&[])[..]].concat();
-    let done = farm.wait_done(farm.submit(&arguments));
-    assert_eq!(done.film_digests(), reference(&farm.place));
+    let job = farm.submit(&small().with(&[FLYBY, "--tile", "40x30"]));
+    assert_eq!(farm.wait_done(job).film_digests(), small().digests);
 }
 
 #[test]
 fn a_part_of_an_image_has_the_pixels_of_the_whole() {
+    if !need::tool("oiiotool") {
+        return;
+    }
     let place = Place::new();
-    let image = [&SMALL[..], &["--frames", "3"]].concat();
+    let image = [&TINY[..], &["--frames", "3"]].concat();
     rendered(&place, "whole", &image);
-    rendered(
-        &place,
-        "part",
-        &[&image[..], &["--crop", "37,41,133,99"]].concat(),
-    );
-    let frame = |out| place.path(out).join(place.files(out).remove(0));
-    // The film digest covers the window, so pixels are compared one by one.
-    let (whole, part) = (frame("whole"), frame("part"));
-    let arguments = [
-        "image".as_ref(),
-        "compare".as_ref(),
-        whole.as_os_str(),
-        part.as_os_str(),
-    ];
-    place.flyby(arguments).ok();
+    let part = [&image[..], &["--crop", "17,11,73,49"]].concat();
+    rendered(&place, "part", &part);
+    let mut cut = Command::new("oiiotool");
+    cut.current_dir(place.folder()).args([
+        "whole/flyby_0003.exr",
+        "--crop",
+        "56x38+17+11",
+        "-o",
+        "cut.exr",
+    ]);
+    place.run(cut, wait::LIMIT).ok();
+    place
+        .flyby(["image", "compare", "cut.exr", "part/flyby_0003.exr"])
+        .ok();
+    // And a part of another place is told apart.
+    let other = [&image[..], &["--crop", "16,11,72,49"]].concat();
+    rendered(&place, "other", &other);
+    let outcome = place.flyby(["image", "compare", "cut.exr", "other/flyby_0003.exr"]);
+    assert_eq!(outcome.status.code(), Some(4), "{outcome}");
 }
 
 #[test]
@@ -107,7 +124,6 @@ fn at_full_settings_with_two_splits() {
     let image = ["--frames", "120", "--tile"];
     let one = rendered(&farm.place, "one", &[&image[..], &["64x64"]].concat());
     let job = farm.submit(&[&[FLYBY], &image[..], &["200x25"]].concat());
-    let limit = crate::harness::wait::LONG_LIMIT;
-    let done = farm.wait_done_within(limit, job);
+    let done = farm.wait_done_within(wait::LONG_LIMIT, job);
     assert_eq!(done.film_digests(), one);
 }

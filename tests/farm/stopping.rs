@@ -1,6 +1,6 @@
 //! Ctrl-C ends a coordinator and a worker cleanly.
 
-use crate::harness::scenes::{FLYBY, SLOW, rendered};
+use crate::harness::scenes::{ENDLESS, FLYBY, slow};
 use crate::harness::{Farm, Signal};
 
 #[test]
@@ -18,39 +18,29 @@ fn an_idle_farm_ends_with_exit_code_0() {
 #[test]
 fn a_busy_worker_gives_back_what_it_holds() {
     let mut farm = Farm::of_workers(1);
-    let image = [&SLOW[..], &["--frames", "0"]].concat();
-    let job = farm.submit(&[&[FLYBY, "--tile", "40x30"], &image[..]].concat());
+    let job = farm.submit(&slow().with(&[FLYBY, "--tile", "40x30"]));
     farm.wait_acknowledged(job, 5);
     farm.workers[0].signal(Signal::Interrupt);
-    assert_eq!(
-        farm.workers[0].wait().code(),
-        Some(0),
-        "{}",
-        farm.workers[0].stderr()
-    );
+    let code = farm.workers[0].wait().code();
+    assert_eq!(code, Some(0), "{}", farm.workers[0].stderr());
     assert_eq!(farm.job(job).state(), "running");
 
     farm.worker(&["--threads", "1"]);
     let done = farm.wait_done(job);
-    assert_eq!(
-        done.film_digests(),
-        rendered(&farm.place, "reference", &image)
-    );
+    assert_eq!(done.film_digests(), slow().digests);
     assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+    assert_eq!(done.number("attempts_lost"), 0, "{done:?}");
 }
 
 #[test]
 fn a_busy_coordinator_leaves_no_scratch_file_and_its_worker_waits_for_the_next() {
     let mut farm = Farm::of_workers(1);
-    let job = farm.submit(&[&[FLYBY, "--frames", "0..500"], &SLOW[..]].concat());
+    let job = farm.submit(&ENDLESS);
     farm.wait_acknowledged(job, 5);
     farm.coordinator.signal(Signal::Interrupt);
     assert_eq!(farm.coordinator.wait().code(), Some(0));
     let left = farm.place.files("state/jobs");
     assert!(left.iter().all(|file| file.ends_with(".exr")), "{left:?}");
-    assert!(
-        farm.workers[0].ended().is_none(),
-        "{}",
-        farm.workers[0].stderr()
-    );
+    let ended = farm.workers[0].ended();
+    assert!(ended.is_none(), "{}", farm.workers[0].stderr());
 }

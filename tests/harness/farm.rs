@@ -85,7 +85,7 @@ impl Farm {
     /// Submits a job; answers its number.
     #[track_caller]
     pub(crate) fn submit(&self, arguments: &[&str]) -> u64 {
-        let command = ["submit", "--output", "json"];
+        let command = ["submit", "--format", "exr", "--output", "json"];
         let answer = self
             .flyby(command.into_iter().chain(arguments.iter().copied()))
             .json();

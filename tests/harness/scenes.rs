@@ -1,22 +1,88 @@
 //! What the tests render.
 
 use std::path::Path;
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
 
 use super::{Place, wait};
 
 /// The thesis's animation.
 pub(crate) const FLYBY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/flyby.toml");
 
-/// Settings at which [`FLYBY`]'s frames take about a second.
-pub(crate) const SMALL: [&str; 4] = ["--resolution", "200x150", "--rays", "2"];
+/// Settings for a frame of which only its being there matters.
+pub(crate) const TINY: [&str; 4] = ["--resolution", "80x60", "--rays", "1"];
 
-/// Settings at which a frame takes long enough for something to happen meanwhile.
-pub(crate) const SLOW: [&str; 4] = ["--resolution", "200x150", "--rays", "6"];
+/// All images of [`FLYBY`], at settings with which they take many minutes.
+pub(crate) const ENDLESS: [&str; 5] = [FLYBY, "--resolution", "200x150", "--rays", "4"];
+
+/// How long one thread shall take over [`slow`]'s images: long enough that something can happen meanwhile.
+const SLOW: Duration = Duration::from_secs(4);
+
+/// Images 0 and 1 of [`FLYBY`] at some settings, as one process rendered them.
+pub(crate) struct Reference {
+    settings: Vec<String>,
+    /// The images' film digests.
+    pub(crate) digests: Vec<String>,
+}
+
+impl Reference {
+    fn new(rays: u32) -> Self {
+        let rays = rays.to_string();
+        let settings = [
+            "--resolution",
+            "200x150",
+            "--rays",
+            &rays,
+            "--frames",
+            "0..2",
+        ];
+        Self {
+            digests: rendered(&Place::new(), "reference", &settings),
+            settings: settings.map(str::to_owned).to_vec(),
+        }
+    }
+
+    /// The options that give these images, and `more`.
+    pub(crate) fn with<'a>(&'a self, more: &[&'a str]) -> Vec<&'a str> {
+        let settings = self.settings.iter().map(String::as_str);
+        settings.chain(more.iter().copied()).collect()
+    }
+}
+
+/// Two images of 200×150 pixels with 2×2 rays.
+pub(crate) fn small() -> &'static Reference {
+    static SMALL: OnceLock<Reference> = OnceLock::new();
+    SMALL.get_or_init(|| Reference::new(2))
+}
+
+/// Two images of 200×150 pixels with as many rays as keep one thread of this machine busy for seconds.
+pub(crate) fn slow() -> &'static Reference {
+    static SLOWLY: OnceLock<Reference> = OnceLock::new();
+    SLOWLY.get_or_init(|| {
+        let start = Instant::now();
+        let quick = [
+            "--resolution",
+            "200x150",
+            "--rays",
+            "1",
+            "--frames",
+            "0..2",
+            "--threads",
+            "1",
+        ];
+        rendered(&Place::new(), "quick", &quick);
+        let (mut rays, took) = (1, start.elapsed());
+        while took * (rays * rays) < SLOW {
+            rays += 1;
+        }
+        Reference::new(rays)
+    })
+}
 
 /// Renders in one process; answers the frames' film digests, as their files tell them.
 #[track_caller]
 pub(crate) fn rendered(place: &Place, out: &str, arguments: &[&str]) -> Vec<String> {
-    let command = ["render", FLYBY, "--out", out].into_iter();
+    let command = ["render", FLYBY, "--format", "exr", "--out", out].into_iter();
     let command = place.command(command.chain(arguments.iter().copied()));
     place.run(command, wait::LONG_LIMIT).ok();
     film_digests(place, out)
@@ -35,16 +101,17 @@ pub(crate) fn film_digests(place: &Place, folder: &str) -> Vec<String> {
 /// The film digest in a frame's header.
 #[track_caller]
 pub(crate) fn film_digest(place: &Place, frame: &Path) -> String {
-    let arguments = [
-        "image".as_ref(),
-        "info".as_ref(),
-        frame.as_os_str(),
-        "--output".as_ref(),
-        "json".as_ref(),
-    ];
-    let info = place.flyby(arguments).json();
+    let info = image_info(place, frame);
     let digest = info["film_digest"].as_str();
-    digest
-        .unwrap_or_else(|| panic!("no film digest: {info}"))
-        .to_owned()
+    let digest = digest.unwrap_or_else(|| panic!("no film digest: {info}"));
+    digest.to_owned()
+}
+
+/// What `flyby image info` says of a frame.
+#[track_caller]
+pub(crate) fn image_info(place: &Place, frame: &Path) -> serde_json::Value {
+    let frame = frame.to_str().unwrap();
+    place
+        .flyby(["image", "info", frame, "--output", "json"])
+        .json()
 }
