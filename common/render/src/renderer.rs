@@ -2,9 +2,8 @@
 
 use core::sync::atomic::AtomicBool;
 
-use field::{BATCH, Interval, Points, Scratch, SimdLevel};
+use field::{BATCH, Interval, Points, SimdLevel};
 use glam::DVec3;
-use model::film::CHANNEL_COUNT;
 use model::{ImageNumber, Rect};
 use scene::Description;
 
@@ -125,8 +124,7 @@ impl ImageRenderer {
                 film.push(seen, &mut counts);
             }
         }
-        counts.noise_evaluations += work.scratch.noise_evaluations;
-        debug_assert_eq!(pixels.len(), block.area() as usize * CHANNEL_COUNT);
+        counts.noise_evaluations += work.tracer.scratch.noise_evaluations;
         Ok(counts)
     }
 
@@ -155,7 +153,6 @@ impl ImageRenderer {
             &self.surface,
             Goal::Distance,
             &work.rays,
-            &mut work.scratch,
             cancel,
             counts,
             &mut work.hits,
@@ -173,7 +170,7 @@ impl ImageRenderer {
             sights,
             touched,
             places,
-            scratch,
+            tracer,
             ..
         } = work;
         for (index, (hit, sight)) in hits.iter().zip(sights.iter()).enumerate() {
@@ -200,7 +197,7 @@ impl ImageRenderer {
             self.surface.program.evaluate_gradient(
                 self.surface.level,
                 &places.batch(first, n),
-                scratch,
+                &mut tracer.scratch,
                 &mut value[..n],
                 [&mut gx[..n], &mut gy[..n], &mut gz[..n]],
             );
@@ -278,7 +275,6 @@ impl ImageRenderer {
             &self.surface,
             Goal::Occlusion,
             &work.rays,
-            &mut work.scratch,
             cancel,
             counts,
             &mut work.hits,
@@ -299,7 +295,7 @@ impl ImageRenderer {
             touched,
             places,
             fields,
-            scratch,
+            tracer,
             seen,
             ..
         } = work;
@@ -309,8 +305,12 @@ impl ImageRenderer {
         }));
         for first in (0..touched.len()).step_by(BATCH) {
             let n = BATCH.min(touched.len() - first);
-            self.palette
-                .evaluate(self.surface.level, &places.batch(first, n), scratch, fields);
+            self.palette.evaluate(
+                self.surface.level,
+                &places.batch(first, n),
+                &mut tracer.scratch,
+                fields,
+            );
             for i in 0..n {
                 let touched = &touched[first + i];
                 let direction = sights[touched.sample].direction;
@@ -405,7 +405,6 @@ struct Work {
     seen: Vec<Seen>,
     fields: Fields,
     tracer: Tracer,
-    scratch: Scratch,
 }
 
 impl Work {

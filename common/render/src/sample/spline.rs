@@ -46,11 +46,6 @@ impl BSpline {
         self.order as f64
     }
 
-    /// How far its support reaches from its centre, in pixels.
-    pub(crate) fn reach(&self) -> f64 {
-        self.width() / 2.0
-    }
-
     /// N_m(x) and n_m(x), thesis eqs. (6.15c), (6.15d) and (6.16), by a triangle of differences.
     ///
     /// `x` lies in 0 … m.

@@ -80,8 +80,8 @@ impl Dome {
         }
         let mean = dome.mean();
         for entry in &mut dome.entries {
-            for c in 0..3 {
-                entry.again[c] *= mean[c] / (1.0 - AGAIN);
+            for (again, mean) in entry.again.iter_mut().zip(mean) {
+                *again *= mean / (1.0 - AGAIN);
             }
         }
         dome

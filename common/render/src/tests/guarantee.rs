@@ -102,7 +102,6 @@ fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
             surface,
             goal,
             rays,
-            &mut Scratch::new(),
             &AtomicBool::new(false),
             &mut counts,
             &mut hits,

@@ -60,7 +60,7 @@ fn any_rectangle_holds_the_pixels_of_the_whole_and_counts_add_up() {
 
 fn paste(part: &[f32], rect: Rect, pixels: &mut [f32], whole: Rect) {
     let (width, height) = (rect.width() as usize, rect.height() as usize);
-    let full = whole.area() as usize;
+    let full = pixels.len() / 8;
     for (index, value) in part.iter().enumerate() {
         let (plane, rest) = (index / (width * height), index % (width * height));
         let (x, y) = (

@@ -4,10 +4,10 @@
 //! field decides where it ends.
 
 /// Most values asked for within a bracket.
-const COUNT_MAX: u32 = 3;
+const COUNT_MAX: u32 = 4;
 
 /// A value this small, in footprints, is that of a root.
-const ROOT: f64 = 1.0 / 256.0;
+const ROOT: f64 = 1.0 / 1024.0;
 
 /// A distance with the field's value there.
 #[derive(Clone, Copy, Default)]

@@ -10,6 +10,9 @@ use crate::view::Footprint;
 /// Distances are shortened by this share, for the rounding of their own few operations.
 const CAUTION: f64 = 1.0 - 1e-9;
 
+/// The least slope that is reckoned with, per metre: roots farther than its inverse are not ruled out.
+const FLAT: f64 = 1e-12;
+
 /// Room around a bound for places that rounding puts just outside, relative.
 const ROOM: f64 = 1e-8;
 
@@ -40,6 +43,17 @@ impl Known {
                 }
             }
         }
+    }
+
+    /// The growth along a whole ray between two places; `None` where it changes too much for
+    /// one answer to serve.
+    pub(crate) fn growth_along(self, from: DVec3, to: DVec3, direction: DVec3) -> Option<Interval> {
+        const CHANGE_MAX: f64 = 0.02;
+        // Grid points lie up to a gap outside of both places.
+        const ROOM: f64 = 1e-6;
+        let low = self.growth(from, direction) - ROOM;
+        let high = self.growth(to, direction) + ROOM;
+        (high - low < CHANGE_MAX).then_some(Interval::new(low, high))
     }
 
     /// What is known of a field that was split along its seed.
@@ -83,58 +97,47 @@ impl Clearance {
         Self { levels, reach }
     }
 
-    /// How far ahead no root can be, from a place of value `value` > 0.
+    /// How far ahead and back of a place no root can be, where the value is `value`.
     ///
-    /// `growth` is that of the known part, at the place or less. `hint` is where
-    /// to look among the levels, and where to look next time.
+    /// `growth` encloses that of the known part from the place on, and up to it.
+    /// `hint` is where to look among the levels, and where to look next time.
     #[inline]
-    pub(crate) fn ahead(&self, value: f64, growth: f64, hint: &mut usize) -> f64 {
-        if self.levels.is_empty() {
-            return 0.0;
-        }
-        let mut at = (*hint).min(self.levels.len() - 1);
-        let mut best = self.at_level(at, value, growth);
-        while at + 1 < self.levels.len() {
-            let next = self.at_level(at + 1, value, growth);
-            if next <= best {
+    pub(crate) fn spans(&self, value: f64, growth: Interval, hint: &mut usize) -> (f64, f64) {
+        let Some(last) = self.levels.len().checked_sub(1) else {
+            return (0.0, 0.0);
+        };
+        // A level's span is rest / fall; two are compared without dividing.
+        let level = |at: usize| {
+            let (offset, slope) = self.levels[at];
+            let fall = slope - growth.low;
+            (value - offset, if fall > FLAT { fall } else { FLAT })
+        };
+        let mut at = (*hint).min(last);
+        let (mut rest, mut fall) = level(at);
+        while at < last {
+            let (next_rest, next_fall) = level(at + 1);
+            if next_rest * fall <= rest * next_fall {
                 break;
             }
-            (at, best) = (at + 1, next);
+            (at, rest, fall) = (at + 1, next_rest, next_fall);
         }
         while at > 0 {
-            let next = self.at_level(at - 1, value, growth);
-            if next < best {
+            let (next_rest, next_fall) = level(at - 1);
+            if next_rest * fall < rest * next_fall {
                 break;
             }
-            (at, best) = (at - 1, next);
+            (at, rest, fall) = (at - 1, next_rest, next_fall);
         }
         *hint = at;
-        if best > 0.0 { best } else { 0.0 }
-    }
-
-    /// How far back no root can be, by the level that `hint` names.
-    #[inline]
-    pub(crate) fn behind(&self, value: f64, growth: f64, hint: usize) -> f64 {
-        if hint < self.levels.len() {
-            let behind = self.at_level(hint, value, -growth);
-            if behind > 0.0 { behind } else { 0.0 }
-        } else {
-            0.0
-        }
-    }
-
-    #[inline]
-    fn at_level(&self, level: usize, value: f64, growth: f64) -> f64 {
-        let (offset, slope) = self.levels[level];
-        let (rest, fall) = (value - offset, slope - growth);
         if rest <= 0.0 {
-            // Levels beyond have larger offsets still: fall back towards the first.
-            return rest;
+            return (0.0, 0.0);
         }
-        if fall * self.reach <= rest {
-            return self.reach;
-        }
-        rest / fall * CAUTION
+        let rise = self.levels[at].1 + growth.high;
+        let rise = if rise > FLAT { rise } else { FLAT };
+        // rest / fall and rest / rise with one division.
+        let share = rest * CAUTION / (fall * rise);
+        let cut = |span: f64| if span < self.reach { span } else { self.reach };
+        (cut(share * rise), cut(share * fall))
     }
 }
 
@@ -287,13 +290,17 @@ mod tests {
                     .iter()
                     .map(|(offset, slope)| (value - offset) / (slope - growth))
                     .fold(0.0, f64::max);
-                let best = if best < 1e6 { best } else { 1e6 };
                 for hint in 0..levels.len() {
-                    let found = clearance.ahead(value, growth, &mut { hint });
+                    let mut found_at = hint;
+                    let (ahead, behind) =
+                        clearance.spans(value, Interval::point(growth), &mut found_at);
                     assert!(
-                        found <= best && found >= best * 0.999_999,
+                        ahead <= best && ahead >= best * 0.999_999,
                         "{value} {growth}"
                     );
+                    let (offset, slope) = levels[found_at];
+                    let exact = ((value - offset) / (slope + growth)).clamp(0.0, 1e6);
+                    assert!(behind <= exact && behind >= exact * 0.999_999);
                 }
             }
         }
@@ -301,19 +308,20 @@ mod tests {
 
     #[test]
     fn a_level_that_is_never_best_is_dropped() {
-        assert_eq!(
-            clearance(&[(0.0, 4.0), (1.0, 3.9), (2.0, 1.0)])
-                .levels
-                .len(),
-            2
-        );
-        assert_eq!(
-            clearance(&[(0.0, 4.0), (0.5, 2.0), (2.0, 1.0)])
-                .levels
-                .len(),
-            3
-        );
-        assert_eq!(clearance(&[]).ahead(3.0, 0.0, &mut 0), 0.0);
+        let count = |levels: &[(f64, f64)]| clearance(levels).levels.len();
+        assert_eq!(count(&[(0.0, 4.0), (1.0, 3.9), (2.0, 1.0)]), 2);
+        assert_eq!(count(&[(0.0, 4.0), (0.5, 2.0), (2.0, 1.0)]), 3);
+        let nothing = clearance(&[]).spans(3.0, Interval::point(0.0), &mut 0);
+        assert_eq!(nothing, (0.0, 0.0));
+    }
+
+    #[test]
+    fn no_span_exceeds_its_reach() {
+        let (ahead, behind) = clearance(&[(0.0, 1.0)]).spans(5.0, Interval::point(1.0), &mut 0);
+        assert_eq!(ahead, 1e6);
+        assert!((behind - 2.5).abs() < 1e-6);
+        let level = clearance(&[(0.0, 1.0)]).spans(-5.0, Interval::point(0.0), &mut 0);
+        assert_eq!(level, (0.0, 0.0));
     }
 
     #[test]

@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(grid.place(0), 0.0);
         for index in (0..50_000).step_by(77) {
             let gap = grid.place(index + 1) - grid.place(index);
-            assert!(gap <= 0.01 && gap >= 0.0025);
+            assert!((0.0025..=0.01).contains(&gap));
         }
         assert!(grid.place(1_000_000) > 1000.0);
     }

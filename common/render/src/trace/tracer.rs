@@ -6,7 +6,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use field::{BATCH, Points, Scratch};
+use field::{Interval, Points, Scratch};
 use glam::DVec3;
 
 use super::bound;
@@ -26,6 +26,9 @@ const FORESIGHT: f64 = 0.9;
 /// Most evaluations along one ray. A ray that is still not done then runs along the
 /// surface within a step of it, and counts as meeting it where it stands.
 const STEPS_MAX: u32 = 16_384;
+
+/// Rays that advance together: enough for dense batches, few enough for the nearest cache.
+const LANES: usize = 64;
 
 /// A ray to be traced.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -79,6 +82,8 @@ impl Hit {
 pub(crate) struct Tracer {
     lanes: Vec<Lane>,
     batch: Batch,
+    /// Memory of evaluations; also counts noises.
+    pub(crate) scratch: Scratch,
 }
 
 /// The places at which lanes want values.
@@ -123,6 +128,8 @@ struct Lane {
     outside_value: f64,
     steps: u32,
     hint: usize,
+    /// Of the known part over the whole ray, where it hardly changes.
+    growth: Option<Interval>,
     stage: Stage,
     bracket: Bracket,
 }
@@ -145,7 +152,6 @@ impl Tracer {
         surface: &Surface,
         goal: Goal,
         rays: &[Ray],
-        scratch: &mut Scratch,
         cancel: &AtomicBool,
         counts: &mut Counts,
         hits: &mut Vec<Hit>,
@@ -156,7 +162,7 @@ impl Tracer {
         let mut waiting = rays.iter().enumerate();
         self.lanes.clear();
         loop {
-            while self.lanes.len() < BATCH {
+            while self.lanes.len() < LANES {
                 let Some((index, ray)) = waiting.next() else {
                     break;
                 };
@@ -168,7 +174,7 @@ impl Tracer {
             if cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
-            self.batch.evaluate(surface, &self.lanes, scratch);
+            self.batch.evaluate(surface, &self.lanes, &mut self.scratch);
             counts.evaluations += self.lanes.len() as u64;
             for lane in (0..self.lanes.len()).rev() {
                 let value = self.batch.value[lane];
@@ -229,6 +235,7 @@ impl Lane {
     fn new(surface: &Surface, index: usize, ray: &Ray) -> Option<Self> {
         let (start, end) = bound::clip(&surface.bound, ray.origin, ray.direction)?;
         let start = if ray.clear > start { ray.clear } else { start };
+        let last = end;
         let (clear, end) = (ray.grid.first_from(start), ray.grid.first_from(end));
         (clear <= end).then(|| Self {
             ray: index,
@@ -249,6 +256,11 @@ impl Lane {
             outside_value: 0.0,
             steps: 0,
             hint: 0,
+            growth: surface.clearances.known.growth_along(
+                ray.origin + ray.direction * start,
+                ray.origin + ray.direction * last,
+                ray.direction,
+            ),
             stage: Stage::Search,
             bracket: Bracket::default(),
         })
@@ -330,9 +342,10 @@ impl Lane {
     ) {
         let clearances = &surface.clearances;
         let clearance = clearances.at(distance);
-        let growth = clearances.known.growth(place, self.direction);
-        let ahead = clearance.ahead(value, growth, &mut self.hint);
-        let behind = clearance.behind(value, growth, self.hint);
+        let growth = self
+            .growth
+            .unwrap_or_else(|| Interval::point(clearances.known.growth(place, self.direction)));
+        let (ahead, behind) = clearance.spans(value, growth, &mut self.hint);
         if self.at > self.clear && self.grid.place(self.clear) <= self.t - behind {
             counts.backtracks += 1;
             self.at = self.clear;
@@ -343,8 +356,8 @@ impl Lane {
         } else {
             // With x the way to go and c the rate of fall, the spheres at both ends meet where
             // x = ahead + behind · (value − c x) / value.
-            let fall = (self.outside_value - value) / (self.t - self.outside_t);
-            let meet = (ahead + behind) * value / (value + behind * fall);
+            let (drop, way) = (self.outside_value - value, self.t - self.outside_t);
+            let meet = (ahead + behind) * value * way / (value * way + behind * drop);
             if meet > ahead {
                 FORESIGHT * meet
             } else {
