@@ -6,6 +6,7 @@
 //! blocks by the permits they carry, encodings by the scheduler's images in flight.
 
 use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -205,12 +206,15 @@ impl Writer {
 
     fn write(&mut self, plan: &Plan, arrived: &Arrived) -> Result<(), ImageError> {
         let image = arrived.image();
-        if !self.open.contains_key(&image) {
-            let identity = plan.identity_of(image);
-            let scratch = Scratch::create(plan.scratch_path(image), identity, plan.window)?;
-            self.open.insert(image, scratch);
-        }
-        self.open[&image].write_block(arrived.block.rect, &arrived.payload)
+        let scratch = match self.open.entry(image) {
+            Entry::Occupied(open) => open.into_mut(),
+            Entry::Vacant(place) => {
+                let identity = plan.identity_of(image);
+                let path = plan.scratch_path(image);
+                place.insert(Scratch::create(path, identity, plan.window)?)
+            }
+        };
+        scratch.write_block(arrived.block.rect, &arrived.payload)
     }
 
     /// Makes a group durable, each file once, and says so.

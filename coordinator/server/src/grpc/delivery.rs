@@ -89,15 +89,14 @@ impl Listener {
                 Ok(Some(said)) => said.message,
                 Ok(None) | Err(_) => break,
             };
-            match message {
-                Some(Message::Block(delivery)) => {
-                    if self.take(delivery).await.is_err() {
-                        break;
-                    }
-                }
+            let goes_on = match message {
+                Some(Message::Block(delivery)) => self.take(delivery).await.is_ok(),
                 // A message of no known kind is ignored: a newer worker may say more.
-                None => {}
-                Some(Message::Hello(_)) => break,
+                None => true,
+                Some(Message::Hello(_)) => false,
+            };
+            if !goes_on {
+                break;
             }
         }
         let closed = Input::DeliveryClosed {

@@ -64,12 +64,12 @@ impl Shell {
         };
         let mut parts: Vec<proto::JobSnapshot> = Vec::new();
         let mut images = self.sched.images(id).peekable();
-        let mut reasons = views::Reasons::of(self.sched.failures(id));
+        let reasons = views::Reasons::of(self.sched.failures(id));
         loop {
             let part: Vec<_> = images
                 .by_ref()
                 .take(IMAGES_PER_MESSAGE)
-                .map(|view| views::status(&view, job, views::is_over(&summary), &mut reasons))
+                .map(|view| views::status(&view, job, views::is_over(&summary), &reasons))
                 .collect();
             parts.push(proto::JobSnapshot {
                 first: parts.is_empty(),

@@ -45,7 +45,7 @@ async fn said_to(farm: &Farm, hello: proto::Hello) -> Result<(), Failure> {
 
 fn sender_with<T>(first: T) -> (mpsc::Sender<T>, ReceiverStream<T>) {
     let (sender, receiver) = mpsc::channel(16);
-    sender.try_send(first).ok().expect("there is room");
+    assert!(sender.try_send(first).is_ok(), "there is room");
     (sender, ReceiverStream::new(receiver))
 }
 
