@@ -72,12 +72,16 @@ impl SceneOptions {
 
 /// Says what the system says where a file cannot be read at all.
 pub(crate) fn readable(path: &Path) -> Result<(), Error> {
-    File::open(path)
-        .and_then(|mut file| file.read(&mut [0]))
-        .map(|_| ())
-        .map_err(|error| {
-            Error::failed(format!("cannot read the scene `{}`", path.display())).because(error)
-        })
+    let look = || {
+        // Opening a pipe could wait for ever; what is no file is refused by who reads the scene.
+        if path.metadata()?.is_file() {
+            File::open(path)?.read(&mut [0])?;
+        }
+        Ok(())
+    };
+    look().map_err(|error: std::io::Error| {
+        Error::failed(format!("cannot read the scene `{}`", path.display())).because(error)
+    })
 }
 
 impl Scene {
@@ -130,9 +134,10 @@ impl Scene {
 
 /// Every mistake of a scene, each with its place, as one error.
 pub(crate) fn mistakes(error: &SceneError) -> Error {
+    let scene = error.sources.first().map_or("", |file| &file.name);
     let mut text = match error.mistakes.len() {
-        1 => "the scene has a mistake\n".to_owned(),
-        count => format!("the scene has {count} mistakes\n"),
+        1 => format!("the scene `{scene}` has a mistake\n"),
+        count => format!("the scene `{scene}` has {count} mistakes\n"),
     };
     for mistake in &error.mistakes {
         text.push_str(&show(&error.sources, mistake, Severity::Error));

@@ -69,14 +69,14 @@ impl Submission<'_> {
             settings_json: self.settings_json.clone(),
         };
         let description = self.scene.bytes.chunks(CHUNK_BYTES);
-        let description = description.map(|bytes| Part::Description(bytes.to_vec().into()));
+        let description = description.map(|bytes| Part::Description(bytes.to_vec()));
         let assets = self.scene.loaded.assets.iter();
         let assets = assets.flat_map(|(asset, bytes)| {
             let Digest(digest) = asset.digest;
             bytes.chunks(CHUNK_BYTES).map(move |data| {
                 Part::Asset(AssetPart {
                     digest: digest.to_vec(),
-                    data: data.to_vec().into(),
+                    data: data.to_vec(),
                 })
             })
         });
