@@ -1,7 +1,7 @@
 //! A full disk: the sentence says so, nothing half-written is taken for a frame, and with
 //! space again the work goes on.
 
-use crate::harness::scenes::{FLYBY, film_digests, rendered};
+use crate::harness::scenes::{FLYBY, TINY, film_digests, rendered};
 use crate::harness::{Farm, Job, Place, need, wait};
 
 /// Mounts a tmpfs of `$1` on `$2`, then becomes the rest of its words.
@@ -82,7 +82,6 @@ fn a_coordinator_fails_that_image_with_the_reason_and_takes_the_next_job() {
     let reason = failed.images()[0]["error"].as_str().unwrap();
     assert!(reason.contains("no space left"), "{reason}");
 
-    let next =
-        farm.submit(&[&[FLYBY, "--resolution", "40x30", "--rays", "1"], &IMAGE[..]].concat());
+    let next = farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat());
     farm.wait_done(next);
 }
