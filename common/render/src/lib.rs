@@ -4,11 +4,11 @@
 //! nothing else: not on blocks, batches, threads or SIMD levels. This crate opens no file, reads no clock
 //! and starts no thread; [`ImageRenderer`] is the way in.
 //!
-//! - [`sample`]: where and when the image is sampled (thesis §6.2, §6.3).
-//! - [`view`]: how a sample becomes a ray.
-//! - [`trace`]: where the ray meets the surface, guaranteed (thesis §5.2).
-//! - [`shade`], [`sky`]: what light leaves there and arrives here.
-//! - [`film`]: samples become pixels.
+//! - `sample`: where and when the image is sampled (thesis §6.2, §6.3).
+//! - `view`: how a sample becomes a ray.
+//! - `trace`: where the ray meets the surface, guaranteed (thesis §5.2).
+//! - `shade`, `sky`: what light leaves there and arrives here.
+//! - `film`: samples become pixels.
 
 mod assets;
 mod counts;

@@ -3,11 +3,11 @@
 use super::air::{Depth, GROUND, TOP};
 
 /// Entries over heights and over directions.
-const HEIGHTS: usize = 64;
-const DIRECTIONS: usize = 128;
+const HEIGHTS: usize = 32;
+const DIRECTIONS: usize = 64;
 
 /// Steps along each path.
-const STEPS: usize = 48;
+const STEPS: usize = 40;
 
 /// Air between a height and space, along straight paths; `None` where the ground is in the way.
 pub(crate) struct Depths {

@@ -8,12 +8,30 @@ const BLESSED: u32 = 1;
 
 /// BLAKE3 of the planes of every small scene, f32 little-endian.
 const DIGESTS: [(&str, &str); 6] = [
-    ("sphere", ""),
-    ("plane", ""),
-    ("hypertexture", ""),
-    ("ridges", ""),
-    ("planet", ""),
-    ("cube", ""),
+    (
+        "sphere",
+        "a97d2f9ca84f7d315a10d9d384c5d87765f22c8d5c8c7c00e0ae45eee261c4fc",
+    ),
+    (
+        "plane",
+        "c6b1729b39dbbba0239250e05c221be78b3f597b4c4a5228348e6bbb67e20f8d",
+    ),
+    (
+        "hypertexture",
+        "0905ce98614cc4bb9bdd963250e7dbba69669361eef5aff2e923446988647be3",
+    ),
+    (
+        "ridges",
+        "adcad0223dc8459a53ec2da05cd63c75cee8106e50a9dc1061215c2094318077",
+    ),
+    (
+        "planet",
+        "8d389b975dfe9aa14493709465a95c48586ca48c866a0141ae78698fb6cf17b4",
+    ),
+    (
+        "cube",
+        "666de9bc344f78af424f6959034fbe5c4e358d5857fb9c9809b686c94c158dbf",
+    ),
 ];
 
 #[test]

@@ -86,16 +86,29 @@ pub(crate) struct Tracer {
     pub(crate) scratch: Scratch,
 }
 
-/// The places at which lanes want values.
-#[derive(Default)]
+/// The places at which lanes want values, lane by lane.
 struct Batch {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    z: Vec<f64>,
-    footprint: Vec<f64>,
-    time: Vec<f64>,
-    distance: Vec<f64>,
-    value: Vec<f64>,
+    x: [f64; LANES],
+    y: [f64; LANES],
+    z: [f64; LANES],
+    footprint: [f64; LANES],
+    time: [f64; LANES],
+    distance: [f64; LANES],
+    value: [f64; LANES],
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            x: [0.0; LANES],
+            y: [0.0; LANES],
+            z: [0.0; LANES],
+            footprint: [0.0; LANES],
+            time: [0.0; LANES],
+            distance: [0.0; LANES],
+            value: [0.0; LANES],
+        }
+    }
 }
 
 /// No point of a grid.
@@ -160,29 +173,44 @@ impl Tracer {
         hits.resize(first + rays.len(), Hit::None);
         let hits = &mut hits[first..];
         let mut waiting = rays.iter().enumerate();
-        self.lanes.clear();
+        let Self {
+            lanes,
+            batch,
+            scratch,
+        } = self;
+        lanes.clear();
         loop {
-            while self.lanes.len() < LANES {
+            while lanes.len() < LANES {
                 let Some((index, ray)) = waiting.next() else {
                     break;
                 };
-                self.lanes.extend(Lane::new(surface, index, ray));
+                if let Some(lane) = Lane::new(surface, index, ray) {
+                    batch.put(surface, lanes.len(), &lane);
+                    lanes.push(lane);
+                }
             }
-            if self.lanes.is_empty() {
+            if lanes.is_empty() {
                 return Ok(());
             }
             if cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
-            self.batch.evaluate(surface, &self.lanes, &mut self.scratch);
-            counts.evaluations += self.lanes.len() as u64;
-            for lane in (0..self.lanes.len()).rev() {
-                let value = self.batch.value[lane];
-                let distance = self.batch.distance[lane];
-                let state = &mut self.lanes[lane];
-                if let Some(hit) = state.step(surface, goal, value, distance, counts) {
-                    hits[state.ray] = hit;
-                    self.lanes.swap_remove(lane);
+            batch.evaluate(surface, lanes.len(), scratch);
+            counts.evaluations += lanes.len() as u64;
+            // Backwards, so that the lane which fills a gap has had its turn.
+            for index in (0..lanes.len()).rev() {
+                let lane = &mut lanes[index];
+                let (value, distance) = (batch.value[index], batch.distance[index]);
+                match lane.step(surface, goal, value, distance, counts) {
+                    None => batch.put(surface, index, lane),
+                    Some(hit) => {
+                        hits[lane.ray] = hit;
+                        counts.steps += u64::from(lane.steps);
+                        lanes.swap_remove(index);
+                        if let Some(lane) = lanes.get(index) {
+                            batch.put(surface, index, lane);
+                        }
+                    }
                 }
             }
         }
@@ -190,42 +218,38 @@ impl Tracer {
 }
 
 impl Batch {
+    /// Puts down the place at which a lane wants its next value.
+    #[inline]
+    fn put(&mut self, surface: &Surface, index: usize, lane: &Lane) {
+        let t = lane.t;
+        let place = lane.origin + lane.direction * t;
+        // From the eye itself the root is that of t², which is t.
+        let distance = if lane.eye_square > 0.0 {
+            (lane.eye_square + t * (lane.eye_along + t)).sqrt()
+        } else {
+            t
+        };
+        self.x[index] = place.x;
+        self.y[index] = place.y;
+        self.z[index] = place.z;
+        self.distance[index] = distance;
+        self.footprint[index] = surface.footprint.at(distance);
+        self.time[index] = lane.time;
+    }
+
     /// Evaluates the field where the lanes want it.
-    fn evaluate(&mut self, surface: &Surface, lanes: &[Lane], scratch: &mut Scratch) {
-        let n = lanes.len();
-        for column in [
-            &mut self.x,
-            &mut self.y,
-            &mut self.z,
-            &mut self.footprint,
-            &mut self.time,
-            &mut self.distance,
-            &mut self.value,
-        ] {
-            column.resize(n, 0.0);
-        }
-        for (i, lane) in lanes.iter().enumerate() {
-            let t = lane.t;
-            let place = lane.origin + lane.direction * t;
-            let distance = (lane.eye_square + t * (lane.eye_along + t)).sqrt();
-            self.x[i] = place.x;
-            self.y[i] = place.y;
-            self.z[i] = place.z;
-            self.distance[i] = distance;
-            self.footprint[i] = surface.footprint.at(distance);
-            self.time[i] = lane.time;
-        }
+    fn evaluate(&mut self, surface: &Surface, lanes: usize, scratch: &mut Scratch) {
         surface.program.evaluate(
             surface.level,
             &Points {
-                x: &self.x,
-                y: &self.y,
-                z: &self.z,
-                footprint: &self.footprint,
-                time: &self.time,
+                x: &self.x[..lanes],
+                y: &self.y[..lanes],
+                z: &self.z[..lanes],
+                footprint: &self.footprint[..lanes],
+                time: &self.time[..lanes],
             },
             scratch,
-            &mut [&mut self.value],
+            &mut [&mut self.value[..lanes]],
         );
     }
 }
@@ -297,7 +321,6 @@ impl Lane {
         distance: f64,
         counts: &mut Counts,
     ) -> Option<Hit> {
-        counts.steps += 1;
         self.steps += 1;
         if self.steps > STEPS_MAX {
             counts.exhausted += 1;
@@ -351,12 +374,22 @@ impl Lane {
             self.at = self.clear;
             return;
         }
-        let reach = if self.outside == NOWHERE {
+        let (drop, way) = (self.outside_value - value, self.t - self.outside_t);
+        let first = self.outside == NOWHERE;
+        self.outside = self.at;
+        self.outside_t = self.t;
+        self.outside_value = value;
+        self.clear = self.grid.first_from(self.t + ahead).max(self.at + 1);
+        // Within a gap or two of the next point no foresight helps.
+        if self.grid.place(self.clear) - self.t >= ahead + behind {
+            self.at = self.clear;
+            return;
+        }
+        let reach = if first {
             OVERSHOOT * ahead
         } else {
             // With x the way to go and c the rate of fall, the spheres at both ends meet where
             // x = ahead + behind · (value − c x) / value.
-            let (drop, way) = (self.outside_value - value, self.t - self.outside_t);
             let meet = (ahead + behind) * value * way / (value * way + behind * drop);
             if meet > ahead {
                 FORESIGHT * meet
@@ -364,10 +397,6 @@ impl Lane {
                 ahead
             }
         };
-        self.outside = self.at;
-        self.outside_t = self.t;
-        self.outside_value = value;
-        self.clear = self.grid.first_from(self.t + ahead).max(self.at + 1);
         // The last point within reach: one beyond would not be covered.
         let next = self.grid.first_from(self.t + reach) - 1;
         self.at = next.min(self.inside - 1).min(self.end).max(self.clear);
