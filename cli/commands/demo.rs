@@ -64,6 +64,7 @@ pub(crate) fn run(context: &Context, options: &Demo) -> Result<Ending, Error> {
             name: &scene.description().name,
             frames,
             tile: None,
+            min_tile_pixels: None,
             formats: Formats::new([image::Format::Exr, image::Format::Png8]),
             settings_json: serde_json::json!({ "scene": "demo.toml" }).to_string(),
         },

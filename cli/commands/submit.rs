@@ -1,6 +1,7 @@
 //! `flyby submit`: hands a job to a coordinator, and follows it if asked to.
 
 use std::io::{self, Write};
+use std::num::NonZeroU64;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -49,6 +50,15 @@ pub(crate) struct Submit {
     #[arg(long, value_name = "WxH", value_parser = values::resolution, help_heading = "How to compute it")]
     pub(crate) tile: Option<Resolution>,
 
+    /// Fewest pixels of a tile, where the coordinator chooses their size: the squarest that divides the image [default: 2500].
+    #[arg(
+        long,
+        value_name = "N",
+        conflicts_with = "tile",
+        help_heading = "How to compute it"
+    )]
+    pub(crate) min_tile_pixels: Option<NonZeroU64>,
+
     #[command(flatten)]
     pub(crate) farm: FarmOptions,
 }
@@ -93,6 +103,7 @@ pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> 
             name,
             frames,
             tile: options.tile,
+            min_tile_pixels: options.min_tile_pixels,
             formats: options.files.formats(),
             settings_json: options.scene.settings_json(),
         },

@@ -1,5 +1,7 @@
 //! Hands a job to a coordinator: the head, the scene's bytes, its files.
 
+use std::num::NonZeroU64;
+
 use image::Formats;
 use model::{Digest, FrameRange, JobId, Resolution, SubmissionId};
 use tokio_stream::iter;
@@ -23,6 +25,8 @@ pub(crate) struct Submission<'a> {
     pub(crate) frames: FrameRange,
     /// Size of the tiles; `None` leaves it to the coordinator.
     pub(crate) tile: Option<Resolution>,
+    /// Fewest pixels of the tiles that the coordinator chooses; `None` leaves that to it too.
+    pub(crate) min_tile_pixels: Option<NonZeroU64>,
     /// Which files each frame becomes.
     pub(crate) formats: Formats,
     /// What the user said about the scene, JSON.
@@ -67,6 +71,7 @@ impl Submission<'_> {
                 .map(|format| wire_format(format).into())
                 .collect(),
             settings_json: self.settings_json.clone(),
+            min_tile_pixels: self.min_tile_pixels.map_or(0, NonZeroU64::get),
         };
         let description = self.scene.bytes.chunks(CHUNK_BYTES);
         let description = description.map(|bytes| Part::Description(bytes.to_vec()));

@@ -98,7 +98,9 @@ impl Farm {
         let shapes = [(64, 64), (40, 60), (200, 25), (200, 150)];
         let (width, height) = shapes[usize::try_from(random.below(4)).expect("it is small")];
         let tiles = match random.below(4) {
-            0 => TileShape::Rule,
+            0 => TileShape::Rule {
+                min_tile_pixels: None,
+            },
             _ => TileShape::Size { width, height },
         };
         let mut farm = Self {

@@ -154,8 +154,11 @@ pub struct Submission {
 /// How an image's window is cut into tiles.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum TileShape {
-    /// By the rule of thesis C.3.2, with the scheduler's limits.
-    Rule,
+    /// By the rule of thesis C.3.2.
+    Rule {
+        /// Fewest pixels of a tile, the thesis's Min_tsize; the scheduler's own where absent.
+        min_tile_pixels: Option<u64>,
+    },
     /// Tiles of this size; a last column and row of smaller ones where it does not divide the window.
     Size {
         /// Columns, at least 1.

@@ -64,8 +64,8 @@ impl Sched {
             return Err(SubmitRefusal::WindowTooLarge { pixels, max });
         }
         let size = match spec.tiles {
-            TileShape::Rule => TileRule {
-                min_tile_pixels: self.config.min_tile_pixels,
+            TileShape::Rule { min_tile_pixels } => TileRule {
+                min_tile_pixels: min_tile_pixels.unwrap_or(self.config.min_tile_pixels),
                 max_array_size: self.config.max_array_size,
             }
             .tile_size(window),

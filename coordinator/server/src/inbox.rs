@@ -112,7 +112,9 @@ impl Inbox {
             )));
         }
         let tiles = match head.tile {
-            None => sched::TileShape::Rule,
+            None => sched::TileShape::Rule {
+                min_tile_pixels: (head.min_tile_pixels > 0).then_some(head.min_tile_pixels),
+            },
             Some(proto::TileShape { width, height }) => sched::TileShape::Size { width, height },
         };
         Ok(NewJob {

@@ -177,7 +177,7 @@ impl Shell {
                 revision: new.submission.revision.0,
                 settings: new.settings.clone(),
                 statistics: String::new(),
-                software: format!("flyby {}", self.config.build),
+                software: self.config.build.clone(),
                 frames_per_second: film.fps,
                 comments: String::new(),
             },
