@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{IsTerminal as _, Read as _};
+use std::io::{self, IsTerminal as _, Read as _};
 use std::path::Path;
 
 use miette::{
@@ -75,11 +75,11 @@ pub(crate) fn readable(path: &Path) -> Result<(), Error> {
     let look = || {
         // Opening a pipe could wait for ever; what is no file is refused by who reads the scene.
         if path.metadata()?.is_file() {
-            File::open(path)?.read(&mut [0])?;
+            io::copy(&mut File::open(path)?.take(1), &mut io::sink())?;
         }
         Ok(())
     };
-    look().map_err(|error: std::io::Error| {
+    look().map_err(|error: io::Error| {
         Error::failed(format!("cannot read the scene `{}`", path.display())).because(error)
     })
 }
@@ -158,7 +158,7 @@ fn show(sources: &[Source], mistake: &Mistake, severity: Severity) -> String {
     }
     let report = Report::new(diagnostic)
         .with_source_code(NamedSource::new(&source.name, source.text.clone()));
-    let theme = if std::io::stderr().is_terminal() {
+    let theme = if io::stderr().is_terminal() {
         GraphicalTheme::unicode()
     } else {
         GraphicalTheme::unicode_nocolor()
