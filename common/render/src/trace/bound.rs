@@ -14,7 +14,14 @@ const ROOM: f64 = 1e-9;
 /// beyond, by the bound's own promise.
 pub(crate) fn clip(bound: &Bound, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
     let (start, end) = match *bound {
-        Bound::Shell { outer, .. } => sphere(outer * (1.0 + ROOM), origin, direction)?,
+        Bound::Shell { inner, outer } => {
+            let (start, end) = sphere(outer * (1.0 + ROOM), origin, direction)?;
+            // What goes into the inner sphere has met the surface before.
+            match sphere(inner * (1.0 - ROOM), origin, direction) {
+                Some((near, _)) if near > 0.0 && inner > 0.0 => (start, near),
+                _ => (start, end),
+            }
+        }
         Bound::Slab { low, high } => {
             let room = ROOM * (low.abs() + high.abs() + origin.z.abs());
             slab(low - room, high + room, origin.z, direction.z)?
@@ -97,10 +104,16 @@ mod tests {
         let eye = DVec3::new(RADIUS + 25.0, 0.0, 0.0);
         let down = DVec3::new(-0.01, 1.0, 0.0).normalize();
         let (start, end) = clip(&bound, eye, down).unwrap();
-        for t in [start, end] {
+        for (t, expected) in [(start, 5.0), (end, -5.0)] {
             let height = (eye + down * t).length() - RADIUS;
-            assert!((height - 5.0).abs() < 0.01, "{height}");
+            assert!((height - expected).abs() < 0.01, "{height}");
         }
+        let above = clip(&bound, eye, DVec3::new(-0.002, 1.0, 0.0).normalize()).unwrap();
+        let height = (eye + DVec3::new(-0.002, 1.0, 0.0).normalize() * above.1).length() - RADIUS;
+        assert!((height - 5.0).abs() < 0.01, "it leaves upwards: {height}");
+        let inside = DVec3::new(RADIUS, 0.0, 0.0);
+        let (start, end) = clip(&bound, inside, DVec3::X).unwrap();
+        assert!(start == 0.0 && (end - 5.0).abs() < 0.01);
         assert!(clip(&bound, eye, DVec3::X).is_none());
         let level = DVec3::new(0.0, 1.0, 0.0);
         assert!(clip(&bound, eye, level).is_none());

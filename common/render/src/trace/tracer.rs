@@ -369,34 +369,28 @@ impl Lane {
             .growth
             .unwrap_or_else(|| Interval::point(clearances.known.growth(place, self.direction)));
         let (ahead, behind) = clearance.spans(value, growth, &mut self.hint);
-        if self.at > self.clear && self.grid.place(self.clear) <= self.t - behind {
+        // Lanes are at different points of their search, so that branches on how far each one is
+        // would be mispredicted: all of this is computed for every lane.
+        let uncovered = self.grid.place(self.clear) <= self.t - behind;
+        if (self.at > self.clear) & uncovered {
             counts.backtracks += 1;
             self.at = self.clear;
             return;
         }
+        // With x the way to go and c the rate of fall, the spheres at both ends meet where
+        // x = ahead + behind · (value − c x) / value.
         let (drop, way) = (self.outside_value - value, self.t - self.outside_t);
-        let first = self.outside == NOWHERE;
+        let meet = (ahead + behind) * value * way / (value * way + behind * drop);
+        let reach = if self.outside == NOWHERE {
+            OVERSHOOT * ahead
+        } else {
+            FORESIGHT * meet
+        };
+        let reach = if reach > ahead { reach } else { ahead };
         self.outside = self.at;
         self.outside_t = self.t;
         self.outside_value = value;
         self.clear = self.grid.first_from(self.t + ahead).max(self.at + 1);
-        // Within a gap or two of the next point no foresight helps.
-        if self.grid.place(self.clear) - self.t >= ahead + behind {
-            self.at = self.clear;
-            return;
-        }
-        let reach = if first {
-            OVERSHOOT * ahead
-        } else {
-            // With x the way to go and c the rate of fall, the spheres at both ends meet where
-            // x = ahead + behind · (value − c x) / value.
-            let meet = (ahead + behind) * value * way / (value * way + behind * drop);
-            if meet > ahead {
-                FORESIGHT * meet
-            } else {
-                ahead
-            }
-        };
         // The last point within reach: one beyond would not be covered.
         let next = self.grid.first_from(self.t + reach) - 1;
         self.at = next.min(self.inside - 1).min(self.end).max(self.clear);
