@@ -108,8 +108,8 @@ mod tests {
             let height = (eye + down * t).length() - RADIUS;
             assert!((height - expected).abs() < 0.01, "{height}");
         }
-        let above = clip(&bound, eye, DVec3::new(-0.002, 1.0, 0.0).normalize()).unwrap();
-        let height = (eye + DVec3::new(-0.002, 1.0, 0.0).normalize() * above.1).length() - RADIUS;
+        let above = clip(&bound, eye, DVec3::new(-0.0028, 1.0, 0.0).normalize()).unwrap();
+        let height = (eye + DVec3::new(-0.0028, 1.0, 0.0).normalize() * above.1).length() - RADIUS;
         assert!((height - 5.0).abs() < 0.01, "it leaves upwards: {height}");
         let inside = DVec3::new(RADIUS, 0.0, 0.0);
         let (start, end) = clip(&bound, inside, DVec3::X).unwrap();
