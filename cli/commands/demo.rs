@@ -13,6 +13,7 @@ use super::submit::{Order, SubmitReport, Target};
 use crate::error::{Ending, Error};
 use crate::farm::local::{LocalFarm, Troubles};
 use crate::farm::submit::Submission;
+use crate::farm::view::Job;
 use crate::load::{self, Scene};
 use crate::options::{Context, Existing};
 use crate::output::{self, Report, say};
@@ -45,7 +46,7 @@ struct DemoReport {
     /// The movie, where ffmpeg made one.
     movie: Option<PathBuf>,
     /// The job as it ended; null where every frame was there already.
-    result: Option<crate::farm::view::Job>,
+    result: Option<Job>,
 }
 
 /// Runs the command.
@@ -108,9 +109,11 @@ fn interrupted(folder: &Path) -> Error {
 
 impl DemoReport {
     fn new(options: &Demo, frames: usize, done: SubmitReport) -> Self {
+        let missing = |job: &Job| job.images_total.saturating_sub(job.images_done) as usize;
+        let missing = done.result.as_ref().map_or(0, missing);
         Self {
             folder: options.out.clone(),
-            frames,
+            frames: frames.saturating_sub(missing),
             movie: done.movie,
             result: done.result,
         }
@@ -126,6 +129,9 @@ impl Report for DemoReport {
         writeln!(out, "{} frames, each EXR and PNG: {folder}", self.frames)?;
         if let Some(movie) = &self.movie {
             writeln!(out, "the movie: {}", movie.display())?;
+        }
+        if self.frames == 0 {
+            return Ok(());
         }
         writeln!(
             out,

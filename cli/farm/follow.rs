@@ -16,6 +16,7 @@ use super::link::refused;
 use super::view::{Image, Job, Whole};
 use crate::error::{Ending, Error};
 use crate::options::{Context, FarmOptions};
+use crate::output::say;
 use crate::progress::{Progress, amount};
 use crate::stop::Stop;
 
@@ -69,7 +70,11 @@ impl Follower<'_> {
                 watched = self.watch(&mut known, &mut tries) => watched,
             };
             let Err(error) = watched else {
-                return Ok(known.into_whole());
+                let whole = known.into_whole();
+                if let Some(why) = why_frames_failed(&whole.images) {
+                    say(why);
+                }
+                return Ok(whole);
             };
             let Some(delay) = RETRY_AFTER.get(tries).filter(|_| known.reached) else {
                 known.clear_bar();
@@ -210,6 +215,19 @@ impl Known {
             images: self.images.into_values().map(Image::from).collect(),
         }
     }
+}
+
+/// Why the first frame that failed did, and how many others there are; `None` where none failed.
+fn why_frames_failed(images: &[Image]) -> Option<String> {
+    let mut failed = images.iter().filter_map(|image| {
+        let why = image.error.as_deref()?;
+        Some((image.image, why))
+    });
+    let (frame, why) = failed.next()?;
+    Some(match failed.count() {
+        0 => format!("frame {frame} failed: {why}"),
+        others => format!("frame {frame} failed, and {others} others: {why}"),
+    })
 }
 
 /// Camera rays of a job so far.
