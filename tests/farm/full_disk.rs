@@ -82,6 +82,10 @@ fn a_coordinator_fails_that_image_with_the_reason_and_takes_the_next_job() {
     let reason = failed.images()[0]["error"].as_str().unwrap();
     assert!(reason.contains("no space left"), "{reason}");
 
+    // Whoever waits for it is told too.
+    let watch = farm.flyby(["job", "watch", &job.to_string()]);
+    watch.refused(5, &["frame 0 failed", "no space left"]);
+
     let next = farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat());
     farm.wait_done(next);
 }

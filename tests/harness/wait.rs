@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 pub(crate) const LIMIT: Duration = Duration::from_secs(300);
 
 /// How long one image at full settings may take on such a machine.
-pub(crate) const LONG_LIMIT: Duration = Duration::from_secs(20 * 60);
+pub(crate) const LONG_LIMIT: Duration = Duration::from_secs(40 * 60);
 
 /// How often a condition is looked at.
 const LOOK_EVERY: Duration = Duration::from_millis(10);
