@@ -104,7 +104,8 @@ fn a_scene_that_cannot_be_read_is_a_failure() {
         said.contains("nowhere.toml") && said.contains("No such file"),
         "{said}"
     );
-    place.ends(1, &["scene", "show", "."]);
+    let (_, said) = place.ends(2, &["scene", "show", "."]);
+    assert!(said.contains("not an ordinary file"), "{said}");
 }
 
 #[test]
