@@ -124,9 +124,11 @@ impl Farm {
     /// [`Farm::wait_done`] with another limit.
     #[track_caller]
     pub(crate) fn wait_done_within(&self, limit: Duration, job: u64) -> Job {
-        let over = || Some(self.job(job)).filter(Job::is_over);
-        let job = wait::until_within(limit, "the job is over", over);
-        assert_eq!(job.state(), "done", "{job:?}");
+        // It waits without taking the processors from the workers, as asking again and again would.
+        let watch = self.place.command(["job", "watch", &job.to_string()]);
+        let watched = self.place.run(watch, limit);
+        let job = self.job(job);
+        assert_eq!(job.state(), "done", "{job:?}\n{watched}");
         job
     }
 
