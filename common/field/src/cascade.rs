@@ -12,9 +12,9 @@
 //! octave whose cell is 2^detail footprints is the last with its full weight.
 
 use crate::arithmetic::clamp01;
-use crate::dual::Number;
 use crate::hash;
 use crate::noise::Lattice;
+use crate::number::Number;
 use crate::op::{Basis, Op};
 
 /// How octaves are put together.
@@ -147,7 +147,7 @@ fn shape<T: Number>(basis: Basis, noise: T) -> T {
 #[inline(always)]
 fn ridge<T: Number>(offset: f64, noise: T) -> T {
     let t = T::constant(offset).plus(noise.abs().times(-1.0));
-    t.mul(t)
+    t.square()
 }
 
 /// Adds one octave of a sum.
@@ -200,7 +200,7 @@ pub(crate) fn altitude_two<T: Number>(
         return (raised.times(term.weight).gate(live), T::constant(1.0));
     }
     let rest = rest.mul(raised).clamp01();
-    (total.plus(rest.times(term.weight).gate(live)), rest)
+    (total.plus(rest.clone().times(term.weight).gate(live)), rest)
 }
 
 /// Adds one octave of the ridged multifractal; it hands on the octave's signal.
@@ -218,7 +218,7 @@ pub(crate) fn ridged<T: Number>(
     } else {
         rest.times(gain).clamp01().mul(ridge)
     };
-    let octave = signal.times(term.weight * term.amplitude);
+    let octave = signal.clone().times(term.weight * term.amplitude);
     (total.plus(octave.gate(term.weight > 0.0)), signal)
 }
 

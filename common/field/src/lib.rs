@@ -7,13 +7,13 @@
 mod arithmetic;
 mod cascade;
 pub mod curve;
-mod dual;
 pub mod graph;
 pub mod hash;
 pub mod interval;
 mod lanes;
 pub mod modulus;
 pub mod noise;
+mod number;
 pub mod op;
 pub mod points;
 pub mod program;

@@ -6,8 +6,8 @@ use fearless_simd::Simd;
 
 use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Octave, Term};
-use crate::dual::Dual;
 use crate::lanes::{self, Cells, Lanes};
+use crate::number::Dual;
 use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
 use crate::program::machine::{self, Count};
