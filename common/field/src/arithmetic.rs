@@ -3,6 +3,7 @@
 //! Minimum, maximum and selection are comparisons: equal to the bit everywhere,
 //! signed zeros and NaN included. Transcendentals are `libm`'s.
 
+use crate::number::Number;
 use crate::op::Op;
 
 /// A function of one number.
@@ -112,6 +113,19 @@ impl Binary {
                     b
                 }
             }
+        }
+    }
+
+    /// The operation on numbers of any arithmetic.
+    #[inline(always)]
+    pub(crate) fn of_numbers<T: Number>(self, a: T, b: T) -> T {
+        match self {
+            Self::Add => a.plus(b),
+            Self::Sub => a.minus(b),
+            Self::Mul => a.mul(b),
+            Self::Div => a.over(b),
+            Self::Min => a.min(b),
+            Self::Max => a.max(b),
         }
     }
 

@@ -51,6 +51,23 @@ impl Curve {
         }
     }
 
+    /// The value and the first two derivatives at `t`; at a corner, those of the right side.
+    pub fn value_slope_bend(&self, t: f64) -> (f64, f64, f64) {
+        let (value, slope) = self.value_slope(t);
+        let bend = match self.segment(t) {
+            Place::Between(i) if self.join == Join::Smooth => {
+                let width = self.at[i + 1] - self.at[i];
+                let u = (t - self.at[i]) / width;
+                let rise = self.value[i + 1] - self.value[i];
+                let (m, n) = (self.slope[i] * width, self.slope[i + 1] * width);
+                let (c, d) = (3.0 * rise - 2.0 * m - n, m + n - 2.0 * rise);
+                (2.0 * c + u * (6.0 * d)) / (width * width)
+            }
+            _ => 0.0,
+        };
+        (value, slope, bend)
+    }
+
     /// All values over `t`.
     pub fn range(&self, t: Interval) -> Interval {
         let mut range =

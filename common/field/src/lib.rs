@@ -17,6 +17,7 @@ mod number;
 pub mod op;
 pub mod points;
 pub mod program;
+pub mod range;
 pub mod simd;
 pub mod surroundings;
 
@@ -26,5 +27,6 @@ pub use modulus::{Level, Modulus};
 pub use op::{Basis, Kind, Op};
 pub use points::{BATCH, Points, Scratch};
 pub use program::{CompileError, Program};
+pub use range::{Affine, Cell, Jet, Place, Reduced, Segment, Slope};
 pub use simd::SimdLevel;
 pub use surroundings::{Region, Surroundings};

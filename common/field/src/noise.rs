@@ -116,6 +116,14 @@ fn corner(row: u32, z: u32) -> u32 {
     hash::finish_high(hash::absorb(row, z))
 }
 
+/// The gradient at a lattice point: two components are ±1, one is 0.
+pub(crate) fn node_gradient(lattice: Lattice, [x, y, z]: [u32; 3]) -> [f64; 3] {
+    let row = hash::absorb(hash::absorb(lattice.0, x), y);
+    let mut gradient = [0.0; 3];
+    add_gradient(&mut gradient, corner(row, z), 1.0);
+    gradient.map(f64::from)
+}
+
 /// The hashes of a cell's eight corners; x runs fastest.
 #[inline(always)]
 pub(crate) fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {

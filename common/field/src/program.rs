@@ -4,7 +4,7 @@ mod bounds;
 mod code;
 mod fold;
 mod machine;
-mod plan;
+pub(crate) mod plan;
 mod slopes;
 
 #[cfg(test)]
@@ -30,7 +30,7 @@ pub(crate) use slopes::Slopes;
 /// A field ready for evaluation; shared by threads.
 #[derive(Clone, Debug)]
 pub struct Program {
-    plan: Plan,
+    pub(crate) plan: Plan,
     code: Code,
 }
 

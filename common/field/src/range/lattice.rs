@@ -1,0 +1,97 @@
+//! Gradient noise in any arithmetic: the sum of the kernels whose support a place or range touches, thesis eqs. (4.1), (4.9).
+//!
+//! Each kernel is (ξ·d) h(d₁) h(d₂) h(d₃). The profiles h are single steps (Chebyshev bands of the quintic,
+//! thesis §5.4.2), the product ξ·d keeps all correlation, and what symbols the kernel made besides are condensed when it
+//! is done: standard affine arithmetic inside a kernel, reduced outside, gives the same as reduced throughout.
+
+use crate::interval::{Interval, smaller};
+use crate::noise::{self, Lattice};
+use crate::range::Arithmetic;
+use crate::range::function::Function;
+
+/// Beyond so many kernels the noise's range says as much as their sum.
+const KERNELS_MAX: usize = 180;
+
+/// Beyond so many cells from the origin there are no offsets within cells.
+const FAR: f64 = 1e15;
+
+/// How far evaluation in f32 may be from the exact noise: its own rounding, and that of three offsets to 2⁻²⁵ at the steepest slope.
+pub(crate) const BLUR: f64 = noise::ROUNDING + noise::SLOPE * 5.2e-8;
+
+/// All values of the noise, rounding included.
+pub(crate) const RANGE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
+
+/// The lattice planes of one axis that a number is near, with the way from each and the profile there.
+struct Axis<T> {
+    planes: Vec<(u32, T, T)>,
+}
+
+impl<T: Arithmetic> Axis<T> {
+    fn new(at: &T, span: Interval) -> Self {
+        let first = span.low.floor();
+        let last = crate::interval::larger(span.high.ceil(), first + 1.0);
+        let mut planes = Vec::new();
+        let mut plane = first;
+        while plane <= last {
+            let way = at.clone().minus(T::constant(plane));
+            let profile = way.clone().apply(Function::Quintic);
+            planes.push((noise::split(plane).0, way, profile));
+            plane += 1.0;
+        }
+        Self { planes }
+    }
+}
+
+/// How many planes an interval touches.
+fn planes(span: Interval) -> f64 {
+    smaller(span.high.ceil() - span.low.floor(), 1e9) + 1.0
+}
+
+/// The noise at `at`.
+pub(crate) fn gradient_noise<T: Arithmetic>(lattice: Lattice, at: [T; 3]) -> T {
+    let spans = at.each_ref().map(T::range);
+    let near = spans
+        .iter()
+        .all(|span| span.low <= span.high && span.magnitude() < FAR);
+    let kernels: f64 = spans.iter().map(|span| planes(*span)).product();
+    if !near || kernels > KERNELS_MAX as f64 {
+        return T::any(RANGE);
+    }
+    let [x, y, z] = [0, 1, 2].map(|axis| Axis::new(&at[axis], spans[axis]).planes);
+    let mut sum: Option<T> = None;
+    for (i, dx, hx) in &x {
+        for (j, dy, hy) in &y {
+            let sheet = hx.clone().mul(hy.clone());
+            for (k, dz, hz) in &z {
+                let xi = noise::node_gradient(lattice, [*i, *j, *k]);
+                let rise = along(xi, [dx, dy, dz]);
+                let kernel = rise.mul(sheet.clone().mul(hz.clone())).settled(&at);
+                sum = Some(match sum {
+                    Some(sum) => sum.plus(kernel),
+                    None => kernel,
+                });
+            }
+        }
+    }
+    let sum = sum.unwrap_or_else(|| T::constant(0.0));
+    sum.blurred(BLUR).within(RANGE)
+}
+
+/// ξ·d, of the two components of ξ that are not zero.
+fn along<T: Arithmetic>(xi: [f64; 3], ways: [&T; 3]) -> T {
+    let mut sum: Option<T> = None;
+    for (part, way) in xi.into_iter().zip(ways) {
+        if part != 0.0 {
+            let term = if part > 0.0 {
+                way.clone()
+            } else {
+                way.clone().neg()
+            };
+            sum = Some(match sum {
+                Some(sum) => sum.plus(term),
+                None => term,
+            });
+        }
+    }
+    sum.unwrap_or_else(|| T::constant(0.0))
+}

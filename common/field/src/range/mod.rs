@@ -1,0 +1,83 @@
+//! Arithmetics of ranges: what a field can be over a segment of a ray, over a cell, over a box.
+//!
+//! | arithmetic | a number is | source |
+//! |---|---|---|
+//! | [`Interval`] | low … high | thesis §5.3.1, eq. (5.14) |
+//! | [`Affine`] | a centre and any number of error symbols, at most 64 | thesis §5.3.2, eqs. (5.15)–(5.18) |
+//! | [`Reduced<1>`](Reduced) | centre, the ray's symbol, one of its own | thesis §5.3.3, eqs. (5.19)–(5.22) |
+//! | [`Reduced<3>`](Reduced) | centre, the cell's three symbols, one of its own | thesis §7.3, eq. (7.11) |
+//! | [`Slope`] | an interval and those of its derivatives | thesis §5.4, Mitchell's G′ |
+//! | [`Jet`] | value, gradient, Hessian at a point | thesis eqs. (2.17), (2.18 mended: ERRATA) |
+//!
+//! **Rounding.** Every range holds the exact result *and* the one that evaluation computes. Nothing touches
+//! the processor's rounding mode (thesis §5.3.1 calls that slow, and leaves it out): an interval is widened by
+//! eight units in the last place after each operation, which costs two multiplications and two additions; an
+//! affine form adds a few units of the magnitudes that went into the operation to its own symbol, whose
+//! coefficient is a sum anyway. Eight units are far more than one operation's error, so that the rounding of
+//! the bound's own computation is covered too. Noises are evaluated in f32 ([`crate::noise::ROUNDING`]);
+//! their ranges have that much room besides.
+//!
+//! What each operation is stands once per arithmetic, in its `Number` and `Arithmetic`; functions of one
+//! number stand once for all of them, in `function`. What is written over these traits (cascades, shapes,
+//! noises) has all arithmetics at once. `tests` is the conformance suite.
+
+pub(crate) mod affine;
+mod evaluate;
+mod form;
+pub(crate) mod function;
+mod interval;
+mod jet;
+mod lattice;
+mod points;
+mod reduced;
+mod slope;
+
+#[cfg(test)]
+mod tests;
+
+pub use affine::Affine;
+pub use evaluate::{Cell, Place, Segment};
+pub use jet::Jet;
+pub use reduced::Reduced;
+pub use slope::Slope;
+
+use crate::curve::Curve;
+use crate::interval::Interval;
+use crate::noise::Lattice;
+use crate::number::Number;
+use function::Function;
+
+/// An arithmetic in which a whole field can be evaluated.
+pub(crate) trait Arithmetic: Number {
+    /// Some number of `range`, related to nothing else. Point arithmetics take its middle.
+    fn any(range: Interval) -> Self;
+
+    /// All values it may have; at a point, the value.
+    fn range(&self) -> Interval;
+
+    /// The same number, now that it is also known to lie in `range`.
+    fn within(self, range: Interval) -> Self;
+
+    /// The same number, with room for an error; at a point, the same.
+    fn blurred(self, error: f64) -> Self;
+
+    /// Any number between the two; a point arithmetic is never asked and answers the first.
+    fn hull(self, other: Self) -> Self;
+
+    /// φ of it.
+    fn apply(self, function: Function) -> Self;
+
+    /// A curve over it.
+    fn curve(self, curve: &Curve) -> Self;
+
+    /// What is left of it once its own parts are done with, `inputs` excepted: standard affine forms
+    /// condense what no input knows, thesis eq. (5.18) and §5.4.2.
+    fn settled(self, _inputs: &[Self; 3]) -> Self {
+        self
+    }
+
+    /// Gradient noise at a place, thesis eq. (4.9).
+    fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
+        lattice::gradient_noise(lattice, at)
+    }
+}

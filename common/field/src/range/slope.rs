@@ -1,0 +1,177 @@
+//! Intervals with those of their derivatives: what Mitchell's method and local bounds of the gradient ask.
+//!
+//! The derivatives hold wherever the function has them, and both sides' where it has a corner, so that between
+//! two points it changes by no more than they allow. Where it may jump they are everything.
+
+use crate::arithmetic::Unary;
+use crate::curve::Curve;
+use crate::interval::Interval;
+use crate::number::Number;
+use crate::range::Arithmetic;
+use crate::range::function::Function;
+use crate::range::interval::curve_over;
+
+/// All values of a function over a region, and all of its derivatives by `N` variables.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Slope<const N: usize> {
+    /// The values.
+    pub value: Interval,
+    /// The derivatives.
+    pub slopes: [Interval; N],
+}
+
+impl<const N: usize> Slope<N> {
+    /// Values over a region through which variable `i` runs at a rate of `rates[i]` per unit.
+    pub const fn of_variables(value: Interval, rates: [f64; N]) -> Self {
+        let mut slopes = [Interval::point(0.0); N];
+        let mut i = 0;
+        while i < N {
+            slopes[i] = Interval::point(rates[i]);
+            i += 1;
+        }
+        Self { value, slopes }
+    }
+
+    fn chain(self, value: Interval, slope: Interval) -> Self {
+        Self {
+            value,
+            slopes: self.slopes.map(|part| part.mul(slope)),
+        }
+    }
+
+    fn zip(self, other: Self, value: Interval, f: impl Fn(Interval, Interval) -> Interval) -> Self {
+        let mut slopes = self.slopes;
+        for (part, other) in slopes.iter_mut().zip(other.slopes) {
+            *part = f(*part, other);
+        }
+        Self { value, slopes }
+    }
+
+    /// Whichever of two continuous functions counts.
+    fn either(self, other: Self, value: Interval) -> Self {
+        self.zip(other, value, Interval::hull)
+    }
+}
+
+impl<const N: usize> Number for Slope<N> {
+    fn constant(value: f64) -> Self {
+        Self::of_variables(Interval::point(value), [0.0; N])
+    }
+
+    fn plus(self, other: Self) -> Self {
+        self.zip(other, self.value.add(other.value), Interval::add)
+    }
+
+    fn minus(self, other: Self) -> Self {
+        self.zip(other, self.value.sub(other.value), Interval::sub)
+    }
+
+    fn times(self, factor: f64) -> Self {
+        let factor = Interval::point(factor);
+        self.chain(self.value.mul(factor), factor)
+    }
+
+    fn mul(self, other: Self) -> Self {
+        let (a, b) = (self.value, other.value);
+        self.zip(other, a.mul(b), |p, q| p.mul(b).add(q.mul(a)))
+    }
+
+    fn over(self, other: Self) -> Self {
+        let value = self.value.div(other.value);
+        self.zip(other, value, |p, q| p.sub(value.mul(q)).div(other.value))
+    }
+
+    fn unary(self, unary: Unary) -> Self {
+        self.apply(Function::Unary(unary))
+    }
+
+    fn min(self, other: Self) -> Self {
+        if self.value.high < other.value.low {
+            self
+        } else if other.value.high < self.value.low {
+            other
+        } else {
+            self.either(other, self.value.min(other.value))
+        }
+    }
+
+    fn max(self, other: Self) -> Self {
+        if self.value.low > other.value.high {
+            self
+        } else if other.value.low > self.value.high {
+            other
+        } else {
+            self.either(other, self.value.max(other.value))
+        }
+    }
+
+    fn power(self, exponent: f64) -> Self {
+        self.apply(Function::Power(exponent))
+    }
+
+    fn clamp01(self) -> Self {
+        self.apply(Function::Clamp)
+    }
+
+    fn select(self, negative: Self, other: Self) -> Self {
+        if self.value.high < 0.0 {
+            negative
+        } else if self.value.low >= 0.0 {
+            other
+        } else {
+            negative.hull(other)
+        }
+    }
+
+    fn gate(self, live: bool) -> Self {
+        if live { self } else { Self::constant(0.0) }
+    }
+
+    fn square(self) -> Self {
+        self.apply(Function::Square)
+    }
+}
+
+impl<const N: usize> Arithmetic for Slope<N> {
+    fn any(range: Interval) -> Self {
+        Self {
+            value: range,
+            slopes: [Interval::ALL; N],
+        }
+    }
+
+    fn range(&self) -> Interval {
+        self.value
+    }
+
+    fn within(self, range: Interval) -> Self {
+        Self {
+            value: self.value.meet(range),
+            ..self
+        }
+    }
+
+    fn blurred(self, error: f64) -> Self {
+        Self {
+            value: self.value.expand(error),
+            ..self
+        }
+    }
+
+    fn hull(self, other: Self) -> Self {
+        Self::any(Interval::hull(self.value, other.value))
+    }
+
+    fn apply(self, function: Function) -> Self {
+        let slopes = function.slopes(self.value);
+        self.chain(function.image(self.value), slopes)
+    }
+
+    fn curve(self, curve: &Curve) -> Self {
+        let steepest = curve.slope_max(self.value) * (1.0 + 1e-12);
+        self.chain(
+            curve_over(curve, self.value),
+            Interval::new(-steepest, steepest),
+        )
+    }
+}
