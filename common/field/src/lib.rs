@@ -7,6 +7,7 @@
 mod arithmetic;
 mod cascade;
 pub mod curve;
+pub mod fft;
 pub mod graph;
 pub mod hash;
 pub mod interval;
