@@ -3,6 +3,7 @@
 //! A scene file becomes a [`Description`] once, where it is submitted. Everyone
 //! else only ever sees the description.
 
+mod alone;
 mod bound;
 mod bytes;
 mod camera;
@@ -20,6 +21,7 @@ mod summary;
 mod sun;
 mod vector;
 
+pub use alone::{Alone, ExpressionError, expression};
 pub use bytes::{BYTES_MAX, NotAScene, NotWritable, digest_of};
 pub use camera::{Flight, Pose};
 pub use curve::Curve;
