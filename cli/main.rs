@@ -11,6 +11,7 @@ mod existing;
 mod farm;
 mod load;
 mod movie;
+mod noise;
 mod options;
 mod output;
 mod places;

@@ -5,6 +5,7 @@ mod coordinator;
 mod demo;
 mod image;
 mod job;
+mod noise;
 mod render;
 mod scene;
 mod submit;
@@ -74,6 +75,9 @@ enum Command {
     /// What frames hold: digests, metadata, differences.
     #[command(subcommand)]
     Image(image::ImageCommand),
+    /// Noises: the statistics by which they are judged, as tables and plots.
+    #[command(subcommand)]
+    Noise(noise::NoiseCommand),
     /// Prints a completion script for a shell.
     Completions(completions::Completions),
     /// Writes the manual pages.
@@ -95,6 +99,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Job(command) => job::run(&context, command),
         Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),
+        Command::Noise(command) => noise::run(&context, command),
         Command::Completions(options) => completions::completions(&options, Cli::command()),
         Command::Man(options) => completions::man(&options, Cli::command()),
     }

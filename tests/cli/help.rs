@@ -2,7 +2,7 @@
 
 use crate::place::Place;
 
-const COMMANDS: [&str; 8] = [
+const COMMANDS: [&str; 9] = [
     "demo",
     "render",
     "coordinator",
@@ -11,6 +11,7 @@ const COMMANDS: [&str; 8] = [
     "job",
     "scene",
     "image",
+    "noise",
 ];
 
 #[test]

@@ -9,6 +9,7 @@
 
 mod help;
 mod image;
+mod noise;
 mod place;
 mod render;
 mod scene;
