@@ -14,6 +14,7 @@ mod assets;
 mod counts;
 mod error;
 mod film;
+mod places;
 mod renderer;
 mod sample;
 mod shade;
@@ -36,4 +37,4 @@ pub use sample::strata::RAYS_MAX;
 ///
 /// The test `pixels_change_only_with_the_revision` holds digests of small images
 /// beside it. Jobs are pinned to one revision, and only workers of it get their tiles.
-pub const REVISION: u32 = 1;
+pub const REVISION: u32 = 2;

@@ -2,7 +2,7 @@
 
 use core::sync::atomic::AtomicBool;
 
-use field::{BATCH, Interval, Points, SimdLevel};
+use field::{BATCH, Interval, SimdLevel};
 use glam::DVec3;
 use model::{ImageNumber, Rect};
 use scene::Description;
@@ -11,12 +11,13 @@ use crate::assets::Assets;
 use crate::counts::Counts;
 use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
+use crate::places::Places;
 use crate::sample::spline::FILTER_ORDER_MAX;
 use crate::sample::strata::RAYS_MAX;
 use crate::sample::{Sample, Strata};
 use crate::shade::light::Lit;
-use crate::shade::{Fields, Palette, mean_albedo};
-use crate::sky::Sky;
+use crate::shade::{Fields, Palette, Patch, mean_albedo};
+use crate::sky::{Clouds, Crossing, Scanned, Sky};
 use crate::trace::{Goal, Hit, Ray, Surface, Tracer};
 use crate::view::{Sight, View};
 
@@ -49,6 +50,7 @@ pub struct ImageRenderer {
     surface: Surface,
     palette: Palette,
     sky: Sky,
+    clouds: Option<Clouds>,
     shadows: bool,
 }
 
@@ -88,6 +90,7 @@ impl ImageRenderer {
         Ok(Self {
             strata: Strata::new(rays, order, description.key, image.0),
             sky: Sky::new(description, start, up, ground),
+            clouds: Clouds::new(description, view.eye(), Interval::new(start, end))?,
             view,
             surface,
             palette,
@@ -290,6 +293,19 @@ impl ImageRenderer {
 
     /// Gives every sample its colour.
     fn shade(&self, work: &mut Work) {
+        work.seen.resize(
+            work.sights.len(),
+            Seen {
+                radiance: [0.0; 3],
+                surface: None,
+            },
+        );
+        self.shade_surface(work);
+        self.shade_sky(work);
+    }
+
+    /// Colours the samples that met the surface.
+    fn shade_surface(&self, work: &mut Work) {
         let Work {
             sights,
             touched,
@@ -299,12 +315,12 @@ impl ImageRenderer {
             seen,
             ..
         } = work;
-        seen.extend(sights.iter().map(|sight| Seen {
-            radiance: self.sky.background(sight.direction),
-            surface: None,
-        }));
         for first in (0..touched.len()).step_by(BATCH) {
             let n = BATCH.min(touched.len() - first);
+            for (i, touched) in touched[first..first + n].iter().enumerate() {
+                let facing = touched.normal.dot(sights[touched.sample].direction);
+                places.widen(first + i, Patch::longer(facing));
+            }
             self.palette.evaluate(
                 self.surface.level,
                 &places.batch(first, n),
@@ -314,17 +330,17 @@ impl ImageRenderer {
             for i in 0..n {
                 let touched = &touched[first + i];
                 let direction = sights[touched.sample].direction;
-                let slope = if self.palette.is_by_slope() {
-                    let vertical = self.surface.vertical(touched.place);
-                    libm::acos(touched.normal.dot(vertical).clamp(-1.0, 1.0))
-                } else {
-                    0.0
-                };
-                let height = self.surface.height(touched.place);
+                let patch = Patch::new(
+                    touched.normal,
+                    direction,
+                    self.surface.vertical(touched.place),
+                    self.surface.height(touched.place),
+                    self.surface.footprint.at(touched.distance),
+                );
                 let lit = Lit {
                     normal: touched.normal,
                     direction,
-                    albedo: self.palette.albedo(fields, i, height, slope),
+                    albedo: self.palette.albedo(fields, i, &patch),
                     sun: touched.sun,
                 };
                 let radiance = lit.radiance(&self.sky);
@@ -333,6 +349,38 @@ impl ImageRenderer {
                     surface: Some((touched.distance, touched.normal)),
                 };
             }
+        }
+    }
+
+    /// Colours the samples that met nothing: sun, sky and clouds.
+    fn shade_sky(&self, work: &mut Work) {
+        let Work {
+            sights,
+            tracer,
+            seen,
+            scanned,
+            crossings,
+            ..
+        } = work;
+        scanned.clear();
+        crossings.clear();
+        for (index, (sight, seen)) in sights.iter().zip(seen).enumerate() {
+            if seen.surface.is_some() {
+                continue;
+            }
+            seen.radiance = self.sky.background(sight.direction);
+            let crossing = self.clouds.as_ref().and_then(|clouds| {
+                let angle = self.surface.footprint.angle;
+                clouds.meet(self.sky.sun, sight, angle, scanned)
+            });
+            crossings.extend(crossing.map(|crossing| (index, crossing)));
+        }
+        let Some(clouds) = &self.clouds else { return };
+        clouds.scan(self.surface.level, &mut tracer.scratch, scanned);
+        let light = self.sky.on_clouds();
+        for &(index, crossing) in &*crossings {
+            let veil = clouds.veil(crossing, sights[index].direction, &light, scanned);
+            work.seen[index].radiance = veil.over(work.seen[index].radiance);
         }
     }
 }
@@ -348,49 +396,6 @@ struct Touched {
     sun: f64,
 }
 
-/// Places in the form that fields are evaluated over.
-#[derive(Default)]
-struct Places {
-    x: Vec<f64>,
-    y: Vec<f64>,
-    z: Vec<f64>,
-    footprint: Vec<f64>,
-    time: Vec<f64>,
-}
-
-impl Places {
-    fn push(&mut self, place: DVec3, footprint: f64, time: f64) {
-        self.x.push(place.x);
-        self.y.push(place.y);
-        self.z.push(place.z);
-        self.footprint.push(footprint);
-        self.time.push(time);
-    }
-
-    fn batch(&self, first: usize, count: usize) -> Points<'_> {
-        let range = first..first + count;
-        Points {
-            x: &self.x[range.clone()],
-            y: &self.y[range.clone()],
-            z: &self.z[range.clone()],
-            footprint: &self.footprint[range.clone()],
-            time: &self.time[range],
-        }
-    }
-
-    fn clear(&mut self) {
-        for column in [
-            &mut self.x,
-            &mut self.y,
-            &mut self.z,
-            &mut self.footprint,
-            &mut self.time,
-        ] {
-            column.clear();
-        }
-    }
-}
-
 /// Memory of one block's rendering, reused from chunk to chunk.
 #[derive(Default)]
 struct Work {
@@ -404,6 +409,9 @@ struct Work {
     asking: Vec<usize>,
     seen: Vec<Seen>,
     fields: Fields,
+    scanned: Scanned,
+    /// Which samples see the layer of clouds, and where.
+    crossings: Vec<(usize, Crossing)>,
     tracer: Tracer,
 }
 

@@ -2,30 +2,49 @@
 
 use field::{Graph, NodeId};
 
-use crate::description::{Description, Surface};
+use crate::description::{Clouds, Description, Sky};
 
-impl Surface {
+impl Description {
     /// Every field that something refers to, in a fixed order.
     pub fn roots(&self) -> Vec<NodeId> {
-        let material = &self.material;
+        let material = &self.surface.material;
         let layers = material
             .layers
             .iter()
             .flat_map(|layer| [layer.cover, layer.height_offset]);
-        [Some(self.field), material.variation]
+        let clouds = self.sky.clouds().map(|clouds| clouds.depth);
+        [Some(self.surface.field), material.variation]
             .into_iter()
             .chain(layers)
+            .chain([clouds])
             .flatten()
             .collect()
     }
 
     fn for_each_root(&mut self, mut change: impl FnMut(&mut NodeId)) {
-        change(&mut self.field);
-        let material = &mut self.material;
+        change(&mut self.surface.field);
+        let material = &mut self.surface.material;
         material.variation.iter_mut().for_each(&mut change);
         for layer in &mut material.layers {
             layer.cover.iter_mut().for_each(&mut change);
             layer.height_offset.iter_mut().for_each(&mut change);
+        }
+        if let Sky::Air {
+            clouds: Some(clouds),
+            ..
+        } = &mut self.sky
+        {
+            change(&mut clouds.depth);
+        }
+    }
+}
+
+impl Sky {
+    /// The clouds, if there are any.
+    pub fn clouds(&self) -> Option<&Clouds> {
+        match self {
+            Self::Air { clouds, .. } => clouds.as_ref(),
+            Self::Plain { .. } => None,
         }
     }
 }
@@ -36,9 +55,9 @@ impl Description {
     ///
     /// Every root must be a node of the graph ([`crate::rules`] checks it).
     pub fn canonical(mut self) -> Self {
-        let (graph, places) = reorder(&self.surface.graph, &self.surface.roots());
+        let (graph, places) = reorder(&self.surface.graph, &self.roots());
         self.surface.graph = graph;
-        self.surface.for_each_root(|root| {
+        self.for_each_root(|root| {
             *root = places[root.index()].expect("the walk started from every root");
         });
         self
@@ -46,7 +65,7 @@ impl Description {
 
     /// Whether the nodes already are in canonical order.
     pub(crate) fn is_canonical(&self) -> bool {
-        let (graph, places) = reorder(&self.surface.graph, &self.surface.roots());
+        let (graph, places) = reorder(&self.surface.graph, &self.roots());
         graph == self.surface.graph
             && places
                 .iter()

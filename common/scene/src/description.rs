@@ -267,7 +267,20 @@ pub enum Sky {
         haze: f64,
         /// Distance at which black terrain keeps 2 % of its contrast; sets aerial perspective.
         visibility: Curve,
+        /// A layer of clouds, if there is one.
+        clouds: Option<Clouds>,
     },
+}
+
+/// A thin layer of clouds, seen from below and behind every surface.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Clouds {
+    /// Height over the seed.
+    pub height: f64,
+    /// How thick they are: how far sunlight goes through them, and how softly they shade themselves.
+    pub thickness: f64,
+    /// Their optical depth along the vertical, a field over world places; below 0 there are none.
+    pub depth: NodeId,
 }
 
 /// A file that the scene names, by content.

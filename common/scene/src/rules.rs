@@ -68,7 +68,7 @@ pub fn problems(scene: &Description) -> Vec<Problem> {
     camera::check(&scene.camera, &mut found);
     surface::check(&scene.surface, scene.assets.len(), &mut found);
     light::check_sun(&scene.sun, &mut found);
-    light::check_sky(&scene.sky, &mut found);
+    light::check_sky(&scene.sky, &scene.surface.graph, &mut found);
     assets(&scene.assets, &mut found);
     found.0
 }

@@ -105,7 +105,8 @@ pub fn describe(scene: &Description) -> Result<Summary, NotWritable> {
         layers: surface.material.layers.len(),
         sky: match scene.sky {
             Sky::Plain { .. } => "plain",
-            Sky::Air { .. } => "air",
+            Sky::Air { clouds: None, .. } => "air",
+            Sky::Air { .. } => "air with clouds",
         },
         assets: scene
             .assets

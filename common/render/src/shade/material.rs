@@ -4,6 +4,7 @@ use field::{Interval, NodeId, Points, Program, Scratch, SimdLevel};
 use scene::Description;
 use scene::description::{Layer, Material};
 
+use super::patch::Patch;
 use super::ramp::Colours;
 use crate::assets::Assets;
 use crate::error::RenderError;
@@ -18,8 +19,6 @@ pub(crate) struct Palette {
     roots: usize,
     /// Which root varies the whole.
     variation: Option<usize>,
-    /// Whether any layer asks for slopes.
-    by_slope: bool,
 }
 
 struct Coat {
@@ -76,17 +75,11 @@ impl Palette {
         };
         Ok(Self {
             ground: material.albedo,
-            by_slope: material.layers.iter().any(by_slope),
             layers,
             fields,
             roots: roots.len(),
             variation,
         })
-    }
-
-    /// Whether slopes matter, or any number will do for them.
-    pub(crate) fn is_by_slope(&self) -> bool {
-        self.by_slope
     }
 
     /// Evaluates the material's fields at a batch of places.
@@ -108,18 +101,20 @@ impl Palette {
         }
     }
 
-    /// The reflectance of place `index` of the batch, at a height over the seed and a slope.
-    pub(crate) fn albedo(&self, fields: &Fields, index: usize, height: f64, slope: f64) -> Colour {
+    /// The mean reflectance of a patch around place `index` of the batch.
+    pub(crate) fn albedo(&self, fields: &Fields, index: usize, patch: &Patch) -> Colour {
         let field = |root: Option<usize>| root.map(|root| fields.rows[root][index]);
         let mut albedo = self.ground;
         for coat in &self.layers {
-            let height = height + field(coat.height_offset).unwrap_or(0.0);
+            let height = patch.height + field(coat.height_offset).unwrap_or(0.0);
+            let by_height = |edges| mean_rise(height, patch.height_spread, edges);
+            let by_slope = |edges| mean_rise(patch.slope, patch.slope_spread, edges);
             let layer = &coat.layer;
             let mut cover = field(coat.cover).map_or(1.0, share);
-            cover *= layer.above.map_or(1.0, |edges| rise(height, edges));
-            cover *= layer.below.map_or(1.0, |edges| 1.0 - rise(height, edges));
-            cover *= layer.steeper.map_or(1.0, |edges| rise(slope, edges));
-            cover *= layer.gentler.map_or(1.0, |edges| 1.0 - rise(slope, edges));
+            cover *= layer.above.map_or(1.0, by_height);
+            cover *= layer.below.map_or(1.0, |edges| 1.0 - by_height(edges));
+            cover *= layer.steeper.map_or(1.0, by_slope);
+            cover *= layer.gentler.map_or(1.0, |edges| 1.0 - by_slope(edges));
             let ramp = coat.ramp.as_ref().map_or([1.0; 3], |ramp| ramp.at(height));
             for c in 0..3 {
                 albedo[c] += (layer.albedo[c] * ramp[c] - albedo[c]) * cover;
@@ -139,10 +134,6 @@ pub(crate) fn mean_albedo(material: &Material) -> Colour {
     })
 }
 
-fn by_slope(layer: &Layer) -> bool {
-    layer.steeper.is_some() || layer.gentler.is_some()
-}
-
 /// `value`, clamped to 0 … 1; not a number is 0.
 fn share(value: f64) -> f64 {
     if value > 0.0 {
@@ -152,13 +143,38 @@ fn share(value: f64) -> f64 {
     }
 }
 
-/// 0 below the first edge, 1 above the second, smooth between; a step where they coincide.
-fn rise(value: f64, [low, high]: [f64; 2]) -> f64 {
-    if high <= low {
-        return if value < low { 0.0 } else { 1.0 };
+/// The mean of a smooth rise over values spread evenly about `value`.
+///
+/// The rise is 0 below the first edge, 1 above the second, a cubic between; a step where they
+/// coincide.
+fn mean_rise(value: f64, spread: f64, [low, high]: [f64; 2]) -> f64 {
+    /// Spreads below this share of the rise change it by less than 10⁻⁶ and have too few digits.
+    const NARROW: f64 = 1e-3;
+    let width = high - low;
+    if width <= 0.0 {
+        return if spread > 0.0 {
+            share((value - low) / spread + 0.5)
+        } else if value < low {
+            0.0
+        } else {
+            1.0
+        };
     }
-    let u = share((value - low) / (high - low));
-    u * u * (3.0 - 2.0 * u)
+    let u = (value - low) / width;
+    let half = spread / width / 2.0;
+    if half > NARROW {
+        (risen(u + half) - risen(u - half)) / (2.0 * half)
+    } else {
+        let u = share(u);
+        u * u * (3.0 - 2.0 * u)
+    }
+}
+
+/// The integral of the rise from 0 to 1, up to `u`.
+fn risen(u: f64) -> f64 {
+    let within = share(u);
+    let beyond = if u > 1.0 { u - 1.0 } else { 0.0 };
+    within * within * within * (1.0 - 0.5 * within) + beyond
 }
 
 #[cfg(test)]
@@ -181,7 +197,6 @@ mod tests {
     fn palette(layers: Vec<Layer>) -> Palette {
         Palette {
             ground: [0.5; 3],
-            by_slope: layers.iter().any(by_slope),
             layers: layers
                 .into_iter()
                 .map(|layer| Coat {
@@ -205,8 +220,15 @@ mod tests {
             ..layer(0.9)
         };
         let palette = palette(vec![layer(0.2), snow]);
-        assert!(palette.is_by_slope());
-        let at = |height, slope| palette.albedo(&Fields::default(), 0, height, slope)[0];
+        let at = |height, slope| {
+            let patch = Patch {
+                height,
+                height_spread: 0.0,
+                slope,
+                slope_spread: 0.0,
+            };
+            palette.albedo(&Fields::default(), 0, &patch)[0]
+        };
         assert_eq!(at(5.0, 0.0), 0.2);
         assert!((at(25.0, 0.0) - 0.9).abs() < 1e-12);
         assert!((at(15.0, 0.0) - 0.55).abs() < 1e-12);
@@ -215,8 +237,27 @@ mod tests {
 
     #[test]
     fn edges_that_coincide_are_a_step() {
-        assert_eq!(rise(0.999, [1.0, 1.0]), 0.0);
-        assert_eq!(rise(1.0, [1.0, 1.0]), 1.0);
+        assert_eq!(mean_rise(0.999, 0.0, [1.0, 1.0]), 0.0);
+        assert_eq!(mean_rise(1.0, 0.0, [1.0, 1.0]), 1.0);
+        assert_eq!(mean_rise(1.25, 1.0, [1.0, 1.0]), 0.75);
         assert_eq!(share(f64::NAN), 0.0);
+    }
+
+    #[test]
+    fn a_spread_takes_the_mean_of_the_rise() {
+        const STEPS: i32 = 4_000;
+        for (value, spread) in [(1.2, 0.5), (2.0, 9.0), (0.0, 3.0), (5.0, 1.0), (1.9, 0.004)] {
+            let sum: f64 = (0..STEPS)
+                .map(|i| {
+                    let share = (f64::from(i) + 0.5) / f64::from(STEPS) - 0.5;
+                    mean_rise(value + share * spread, 0.0, [1.0, 2.0])
+                })
+                .sum();
+            let mean = mean_rise(value, spread, [1.0, 2.0]);
+            assert!(
+                (mean - sum / f64::from(STEPS)).abs() < 1e-5,
+                "{value} {spread}"
+            );
+        }
     }
 }

@@ -2,6 +2,8 @@
 
 pub(crate) mod light;
 pub(crate) mod material;
+mod patch;
 mod ramp;
 
 pub(crate) use material::{Fields, Palette, mean_albedo};
+pub(crate) use patch::Patch;

@@ -1,7 +1,9 @@
 //! Light and air of one image: sun, sky, what falls on surfaces, and what distance does to colours.
 
 mod air;
+mod clouds;
 mod depth;
+mod disc;
 mod dome;
 mod harmonics;
 
@@ -11,6 +13,8 @@ use scene::description::Sky as Kind;
 
 use air::Air;
 pub(crate) use air::Colour;
+use clouds::Light;
+pub(crate) use clouds::{Clouds, Crossing, Scanned};
 use dome::Dome;
 use harmonics::Irradiance;
 
@@ -31,6 +35,8 @@ pub(crate) struct Sky {
     pub(crate) sunlight: Colour,
     /// Irradiance from everywhere else.
     ambient: Irradiance,
+    /// The same for clouds: the mean of what comes from above and below.
+    on_clouds: Colour,
     air: Option<Layer>,
     /// Radiance of the background without air.
     plain: Colour,
@@ -43,6 +49,8 @@ struct Layer {
     strength: Colour,
     /// Per metre.
     extinction: Colour,
+    /// Haze, 1 for a clear day.
+    haze: f64,
 }
 
 impl Sky {
@@ -56,6 +64,7 @@ impl Sky {
                 sun,
                 sunlight: strength,
                 ambient: Irradiance::uniform(*ambient),
+                on_clouds: *ambient,
                 air: None,
                 plain: *radiance,
             },
@@ -63,6 +72,7 @@ impl Sky {
                 rayleigh,
                 haze,
                 visibility,
+                clouds: _,
             } => {
                 let air = Air {
                     rayleigh: *rayleigh,
@@ -74,6 +84,7 @@ impl Sky {
                     dome,
                     strength,
                     extinction: extinction(visibility.at(time)),
+                    haze: *haze,
                 };
                 let height = sun.dot(up);
                 let direct = sunlight.map(|light| light * if height > 0.0 { height } else { 0.0 });
@@ -94,10 +105,12 @@ impl Sky {
                         below
                     }
                 });
+                let (over, under) = (ambient.at(up), ambient.at(-up));
                 Self {
                     sun,
                     sunlight,
                     ambient,
+                    on_clouds: [0, 1, 2].map(|c| (over[c] + under[c]) / 2.0),
                     air: Some(layer),
                     plain: [0.0; 3],
                 }
@@ -107,9 +120,20 @@ impl Sky {
 
     /// Radiance seen along a ray that meets no surface.
     pub(crate) fn background(&self, direction: DVec3) -> Colour {
-        match &self.air {
-            Some(layer) => layer.radiance(direction),
-            None => self.plain,
+        let Some(layer) = &self.air else {
+            return self.plain;
+        };
+        let sky = layer.radiance(direction);
+        let sun = disc::radiance(direction.dot(self.sun), layer.haze);
+        [0, 1, 2].map(|c| sky[c] + self.sunlight[c] * sun[c])
+    }
+
+    /// What falls on clouds above.
+    pub(crate) fn on_clouds(&self) -> Light {
+        Light {
+            sun: self.sun,
+            sunlight: self.sunlight,
+            ambient: self.on_clouds,
         }
     }
 

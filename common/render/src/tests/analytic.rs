@@ -157,6 +157,7 @@ fn a_scene_far_away_melts_into_the_horizon() {
         rayleigh: 1.0,
         haze: 1.0,
         visibility: scene::Curve::Constant(20.0),
+        clouds: None,
     };
     let rows = pixels(&scene);
     for x in 0..48 {

@@ -4,7 +4,7 @@ use super::scenes::{self, image};
 use crate::{EvalSettings, REVISION};
 
 /// The revision whose pixels these are.
-const BLESSED: u32 = 1;
+const BLESSED: u32 = 2;
 
 /// BLAKE3 of the planes of every small scene, f32 little-endian.
 const DIGESTS: [(&str, &str); 6] = [
@@ -22,11 +22,11 @@ const DIGESTS: [(&str, &str); 6] = [
     ),
     (
         "ridges",
-        "adcad0223dc8459a53ec2da05cd63c75cee8106e50a9dc1061215c2094318077",
+        "4f997c73d4b3b3127a8b8938cfba7d71fc7fafde99c2acf708a58c78bb73c48f",
     ),
     (
         "planet",
-        "8d389b975dfe9aa14493709465a95c48586ca48c866a0141ae78698fb6cf17b4",
+        "ca97dbfc564a3fcfec5aa5f6d7d94965e890248ae4de06e25c8c27fe0ac87245",
     ),
     (
         "cube",

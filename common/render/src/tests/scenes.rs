@@ -5,8 +5,8 @@ use core::sync::atomic::AtomicBool;
 use field::{Basis, Graph, NodeId, Op};
 use model::{ImageNumber, Rect, Resolution};
 use scene::description::{
-    Bound, Camera, Film, GreatCircle, Layer, Material, Path, Projection, Sampling, Seed, Sky, Sun,
-    Surface,
+    Bound, Camera, Clouds, Film, GreatCircle, Layer, Material, Path, Projection, Sampling, Seed,
+    Sky, Sun, Surface,
 };
 use scene::{Curve, Description};
 
@@ -105,7 +105,7 @@ pub(super) fn plane() -> Description {
     standing(fields.0, field, bound, [0.0, 0.0, 2.0])
 }
 
-/// A plane with ridges of half a metre and level of detail, low sun, air and shadows.
+/// A plane with ridges of half a metre and level of detail, low sun, air, clouds and shadows.
 pub(super) fn ridges() -> Description {
     let mut fields = Fields::new();
     let p = fields.position();
@@ -116,6 +116,11 @@ pub(super) fn ridges() -> Description {
     let field = fields.op(Op::Sub, &[z, height], &[]);
     let plain = [Basis::Plain.number(), 8.0, 2.0, 0.5, 5.0, 0.0, 2.0];
     let variation = fields.cascade(ground, 3.0, 0.3, plain);
+    let clouds = Clouds {
+        height: 40.0,
+        thickness: 3.0,
+        depth: fields.cascade(p, 0.05, 2.0, plain),
+    };
     let bound = Bound::Slab {
         low: -1.0,
         high: 1.0,
@@ -133,6 +138,9 @@ pub(super) fn ridges() -> Description {
         ramp: None,
     }];
     air(&mut scene, 60.0);
+    if let Sky::Air { clouds: in_sky, .. } = &mut scene.sky {
+        *in_sky = Some(clouds);
+    }
     scene
 }
 
@@ -216,6 +224,7 @@ fn air(scene: &mut Description, visibility: f64) {
         rayleigh: 1.0,
         haze: 1.5,
         visibility: Curve::Constant(visibility),
+        clouds: None,
     };
 }
 

@@ -106,6 +106,7 @@ fn sample() -> Description {
             rayleigh: 1.0,
             haze: 1.0,
             visibility: Curve::Constant(8000.0),
+            clouds: None,
         },
         assets: vec![AssetRef {
             name: "ramp.png".into(),
@@ -282,4 +283,25 @@ proptest! {
         versioned.extend(bytes);
         prop_assert!(Description::from_bytes(&versioned).is_err());
     }
+}
+
+#[test]
+fn clouds_survive_the_bytes_and_change_the_digest() {
+    let plain = sample();
+    let mut clouded = plain.clone();
+    let depth = clouded.surface.material.variation.unwrap();
+    let Sky::Air { clouds, .. } = &mut clouded.sky else {
+        panic!("the sample has air");
+    };
+    *clouds = Some(Clouds {
+        height: 2000.0,
+        thickness: 150.0,
+        depth,
+    });
+    let bytes = clouded.to_bytes().unwrap();
+    assert_ne!(bytes, plain.to_bytes().unwrap());
+    assert_eq!(
+        Description::from_bytes(&bytes).unwrap(),
+        clouded.canonical()
+    );
 }

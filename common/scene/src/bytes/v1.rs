@@ -198,6 +198,14 @@ enum Sky {
         haze: Real,
         visibility: Curve,
     },
+    Clouded {
+        rayleigh: Real,
+        haze: Real,
+        visibility: Curve,
+        height: Real,
+        thickness: Real,
+        depth: u32,
+    },
 }
 
 #[derive(Serialize, Deserialize)]
@@ -539,10 +547,24 @@ impl From<&d::Sky> for Sky {
                 rayleigh,
                 haze,
                 visibility,
+                clouds: None,
             } => Self::Air {
                 rayleigh: Real(*rayleigh),
                 haze: Real(*haze),
                 visibility: visibility.into(),
+            },
+            d::Sky::Air {
+                rayleigh,
+                haze,
+                visibility,
+                clouds: Some(clouds),
+            } => Self::Clouded {
+                rayleigh: Real(*rayleigh),
+                haze: Real(*haze),
+                visibility: visibility.into(),
+                height: Real(clouds.height),
+                thickness: Real(clouds.thickness),
+                depth: clouds.depth.0,
             },
         }
     }
@@ -563,6 +585,24 @@ impl From<Sky> for d::Sky {
                 rayleigh: rayleigh.0,
                 haze: haze.0,
                 visibility: visibility.into(),
+                clouds: None,
+            },
+            Sky::Clouded {
+                rayleigh,
+                haze,
+                visibility,
+                height,
+                thickness,
+                depth,
+            } => Self::Air {
+                rayleigh: rayleigh.0,
+                haze: haze.0,
+                visibility: visibility.into(),
+                clouds: Some(d::Clouds {
+                    height: height.0,
+                    thickness: thickness.0,
+                    depth: NodeId(depth),
+                }),
             },
         }
     }

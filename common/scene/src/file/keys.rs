@@ -554,4 +554,31 @@ pub(crate) const AIR: &[Key] = &[
         Default("\"50 km\""),
         "Distance at which black terrain keeps 2 % of its contrast.",
     ),
+    key(
+        "clouds",
+        Shape::Table(CLOUDS),
+        Optional,
+        "A thin layer of clouds, seen from below and behind every surface.",
+    ),
+];
+
+pub(crate) const CLOUDS: &[Key] = &[
+    key(
+        "height",
+        Shape::Number(Length),
+        Default("\"2 km\""),
+        "Height of the layer over the plane or sphere of the surface.",
+    ),
+    key(
+        "thickness",
+        Shape::Number(Length),
+        Default("\"150 m\""),
+        "How far light goes through them: how softly they shade themselves.",
+    ),
+    key(
+        "depth",
+        Shape::Field,
+        Required,
+        "Their optical depth along the vertical, by place; where it is not above 0 there are none.",
+    ),
 ];

@@ -15,7 +15,7 @@ use super::section::{Reader, Section, Text};
 use super::tree::Item;
 use crate::bound;
 use crate::curve::Curve;
-use crate::description::{AssetRef, Bound, Description, Film, Sampling};
+use crate::description::{AssetRef, Bound, Description, Film, Sampling, Sky};
 use crate::expression::{Fields, is_name, is_taken};
 use crate::ground;
 use crate::rules::{self, Problem};
@@ -49,12 +49,13 @@ pub(super) fn scene(
     let surface = surface::read(&root, seed, &mut making);
     let film = film(&root.table("film"));
     let camera = camera::read(&root, seed);
+    let sky = light::sky(&root, &making);
     let description = Description {
         name: root.text("name").map_or(stem, |name| name.text).to_owned(),
         key: root.count("key").unwrap_or(1),
         sampling: sampling(&root.table("sampling")),
         sun: light::sun(&root.table("sun"), &camera),
-        sky: light::sky(&root),
+        sky,
         camera,
         film,
         surface: surface.surface,
@@ -327,5 +328,8 @@ fn forget_fields(scene: &mut Description) {
     surface.material.variation = None;
     for layer in &mut surface.material.layers {
         (layer.cover, layer.height_offset) = (None, None);
+    }
+    if let Sky::Air { clouds, .. } = &mut scene.sky {
+        *clouds = None;
     }
 }

@@ -1,7 +1,9 @@
 //! Rules of `[sun]` and `[sky]`.
 
 use super::{LENGTH_MAX, Problems, Wanted};
-use crate::description::{Sky, Sun};
+use field::Graph;
+
+use crate::description::{Clouds, Sky, Sun};
 use crate::vector::dot;
 
 /// Largest irradiance or radiance: far beyond any use, far below overflow in half floats' sums.
@@ -27,7 +29,7 @@ pub(super) fn check_sun(sun: &Sun, found: &mut Problems) {
     found.colour("sun.irradiance", sun.irradiance, LIGHT_MAX);
 }
 
-pub(super) fn check_sky(sky: &Sky, found: &mut Problems) {
+pub(super) fn check_sky(sky: &Sky, graph: &Graph, found: &mut Problems) {
     match sky {
         Sky::Plain { radiance, ambient } => {
             found.colour("sky.plain.radiance", *radiance, LIGHT_MAX);
@@ -37,12 +39,31 @@ pub(super) fn check_sky(sky: &Sky, found: &mut Problems) {
             rayleigh,
             haze,
             visibility,
+            clouds,
         } => {
             let amount = |what| Wanted::number(0.0, 100.0, what);
             found.range("sky.air.rayleigh", *rayleigh, amount("the amount of air"));
             found.range("sky.air.haze", *haze, amount("the amount of haze"));
             let wanted = Wanted::length(1e-3, LENGTH_MAX, "the visibility");
             found.curve("sky.air.visibility", visibility, wanted);
+            if let Some(clouds) = clouds {
+                check_clouds(clouds, graph, found);
+            }
         }
     }
+}
+
+fn check_clouds(clouds: &Clouds, graph: &Graph, found: &mut Problems) {
+    let wanted = |what| Wanted::length(1e-3, LENGTH_MAX, what);
+    found.range(
+        "sky.air.clouds.height",
+        clouds.height,
+        wanted("the height of clouds"),
+    );
+    found.range(
+        "sky.air.clouds.thickness",
+        clouds.thickness,
+        wanted("the thickness of clouds"),
+    );
+    super::surface::scalar("sky.air.clouds.depth", graph, clouds.depth, found);
 }

@@ -111,7 +111,7 @@ fn layer(key: &str, layer: &Layer, graph: &Graph, assets: usize, found: &mut Pro
     }
 }
 
-fn scalar(key: &str, graph: &Graph, field: NodeId, found: &mut Problems) {
+pub(super) fn scalar(key: &str, graph: &Graph, field: NodeId, found: &mut Problems) {
     let is_scalar = field.index() < graph.nodes().len() && graph.kind(field) == Kind::Scalar;
     if !is_scalar {
         found.add(key, "the field is not a number at every point");

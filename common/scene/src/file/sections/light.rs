@@ -1,7 +1,8 @@
 //! `[sun]` and `[sky]`.
 
+use super::{Making, NOWHERE};
 use crate::curve::Curve;
-use crate::description::{Camera, Path, Sky, Sun};
+use crate::description::{Camera, Clouds, Path, Sky, Sun};
 use crate::file::section::Section;
 use crate::vector::local_frame;
 
@@ -28,7 +29,7 @@ pub(super) fn sun(section: &Section<'_>, camera: &Camera) -> Sun {
     }
 }
 
-pub(super) fn sky(root: &Section<'_>) -> Sky {
+pub(super) fn sky(root: &Section<'_>, making: &Making<'_>) -> Sky {
     let section = root.table("sky");
     let kind = if root.has("sky") {
         section.one_of(&["plain", "air"])
@@ -41,11 +42,22 @@ pub(super) fn sky(root: &Section<'_>) -> Sky {
             rayleigh: air.number("rayleigh").unwrap_or(1.0),
             haze: air.number("haze").unwrap_or(1.0),
             visibility: air.curve("visibility").unwrap_or(Curve::Constant(1.0)),
+            clouds: air
+                .has("clouds")
+                .then(|| clouds(&air.table("clouds"), making)),
         };
     }
     let plain = section.table("plain");
     Sky::Plain {
         radiance: plain.colour("radiance").unwrap_or([0.0; 3]),
         ambient: plain.colour("ambient").unwrap_or([0.0; 3]),
+    }
+}
+
+fn clouds(section: &Section<'_>, making: &Making<'_>) -> Clouds {
+    Clouds {
+        height: section.number("height").unwrap_or(1.0),
+        thickness: section.number("thickness").unwrap_or(1.0),
+        depth: making.field(section, "depth").unwrap_or(NOWHERE),
     }
 }
