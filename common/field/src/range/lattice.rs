@@ -10,7 +10,7 @@ use crate::range::Arithmetic;
 use crate::range::function::Function;
 
 /// Beyond so many kernels the noise's range says as much as their sum.
-const KERNELS_MAX: usize = 180;
+const KERNELS_MAX: usize = 64;
 
 /// Beyond so many cells from the origin there are no offsets within cells.
 const FAR: f64 = 1e15;
@@ -58,23 +58,30 @@ pub(crate) fn gradient_noise<T: Arithmetic>(lattice: Lattice, at: [T; 3]) -> T {
         return T::any(RANGE);
     }
     let [x, y, z] = [0, 1, 2].map(|axis| Axis::new(&at[axis], spans[axis]).planes);
-    let mut sum: Option<T> = None;
-    for (i, dx, hx) in &x {
-        for (j, dy, hy) in &y {
-            let sheet = hx.clone().mul(hy.clone());
-            for (k, dz, hz) in &z {
-                let xi = noise::node_gradient(lattice, [*i, *j, *k]);
-                let rise = along(xi, [dx, dy, dz]);
-                let kernel = rise.mul(sheet.clone().mul(hz.clone())).settled(&at);
-                sum = Some(match sum {
-                    Some(sum) => sum.plus(kernel),
-                    None => kernel,
-                });
-            }
-        }
-    }
-    let sum = sum.unwrap_or_else(|| T::constant(0.0));
+    // h₁ (Σ h₂ (Σ h₃ ξ·d)): the same sum with a third of the products, and tighter, since ranges only lose by being spread.
+    let sum = total(&x, |i, dx| {
+        total(&y, |j, dy| {
+            total(&z, |k, dz| {
+                let xi = noise::node_gradient(lattice, [i, j, k]);
+                along(xi, [dx, dy, dz])
+            })
+        })
+        .settled(&at)
+    });
     sum.blurred(BLUR).within(RANGE)
+}
+
+/// Σ h(d) · term over the planes of an axis.
+fn total<T: Arithmetic>(planes: &[(u32, T, T)], term: impl Fn(u32, &T) -> T) -> T {
+    let mut sum: Option<T> = None;
+    for (plane, way, profile) in planes {
+        let part = profile.clone().mul(term(*plane, way));
+        sum = Some(match sum {
+            Some(sum) => sum.plus(part),
+            None => part,
+        });
+    }
+    sum.unwrap_or_else(|| T::constant(0.0))
 }
 
 /// ξ·d, of the two components of ξ that are not zero.
