@@ -32,6 +32,7 @@ pub use field::SimdLevel;
 pub use renderer::{EvalSettings, ImageRenderer};
 pub use sample::spline::FILTER_ORDER_MAX;
 pub use sample::strata::RAYS_MAX;
+pub use trace::methods;
 
 /// The renderer's revision: raised whenever a pixel of any scene changes.
 ///

@@ -8,6 +8,7 @@ pub(crate) mod bound;
 pub(crate) mod bracket;
 pub(crate) mod clearance;
 pub(crate) mod grid;
+pub mod methods;
 pub(crate) mod split;
 pub(crate) mod surface;
 pub(crate) mod tracer;
