@@ -4,6 +4,7 @@
 //! clap read the command line, and hands the command what it needs; no other file looks at
 //! the environment. Each command stands in a file of its own under `commands/`.
 
+mod bench;
 mod commands;
 mod daemon;
 mod error;

@@ -1,5 +1,6 @@
 //! The commands: what each is called, and which file runs it.
 
+mod bench;
 mod completions;
 mod coordinator;
 mod demo;
@@ -78,6 +79,9 @@ enum Command {
     /// Noises: the statistics by which they are judged, as tables and plots.
     #[command(subcommand)]
     Noise(noise::NoiseCommand),
+    /// Measurements beside those of the reference documents.
+    #[command(subcommand)]
+    Bench(bench::BenchCommand),
     /// Prints a completion script for a shell.
     Completions(completions::Completions),
     /// Writes the manual pages.
@@ -100,6 +104,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),
         Command::Noise(command) => noise::run(&context, command),
+        Command::Bench(command) => bench::run(&context, command),
         Command::Completions(options) => completions::completions(&options, Cli::command()),
         Command::Man(options) => completions::man(&options, Cli::command()),
     }

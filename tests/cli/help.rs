@@ -2,7 +2,8 @@
 
 use crate::place::Place;
 
-const COMMANDS: [&str; 9] = [
+const COMMANDS: [&str; 10] = [
+    "bench",
     "demo",
     "render",
     "coordinator",

@@ -1,0 +1,8 @@
+//! What `flyby bench` measures: [`thesis`] fixes what is cast at what, [`cast`] counts, [`report`] prints.
+
+pub(crate) mod cast;
+pub(crate) mod report;
+pub(crate) mod thesis;
+
+#[cfg(test)]
+mod tests;
