@@ -6,6 +6,7 @@
 use std::collections::HashMap;
 
 use crate::op::{Basis, Kind, Op, Params};
+use crate::shape::Shape;
 
 /// Most nodes of a graph.
 pub const NODES_MAX: usize = 65_536;
@@ -18,6 +19,9 @@ pub const OCTAVES_MAX: f64 = 48.0;
 
 /// Most keys of a curve.
 pub const KEYS_MAX: usize = 4_096;
+
+/// Most numbers of a shape's list.
+pub const LIST_MAX: usize = 8_192;
 
 /// A node of one graph. Its arguments have smaller ids than it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -152,6 +156,7 @@ impl Graph {
             Params::Keys => {
                 !params.is_empty() && params.len().is_multiple_of(2) && params.len() <= 2 * KEYS_MAX
             }
+            Params::List => params.len() <= LIST_MAX,
         };
         if !fits || !counted {
             return Err(GraphError::Arguments(signature.name));
@@ -172,7 +177,13 @@ fn check_ranges(op: Op, params: &[f64]) -> Result<(), GraphError> {
             value,
         })
     };
+    if let Some(Err((wanted, value))) = Shape::new(op, params) {
+        return refuse(wanted, value);
+    }
     let Params::Named(names) = signature.params else {
+        if signature.params == Params::List {
+            return Ok(());
+        }
         return match params
             .chunks_exact(2)
             .zip(params.chunks_exact(2).skip(1))

@@ -19,6 +19,7 @@ pub mod op;
 pub mod points;
 pub mod program;
 pub mod range;
+mod shape;
 pub mod simd;
 pub mod surroundings;
 

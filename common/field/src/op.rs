@@ -49,6 +49,8 @@ pub enum Params {
     Named(&'static [&'static str]),
     /// Pairs of an instant and a value, at least one, instants rising.
     Keys,
+    /// A list of numbers, as long as the operation wants it.
+    List,
 }
 
 /// What an operation takes and gives.
@@ -179,6 +181,21 @@ ops! {
     RidgedMultifractal = 68 "ridged_multifractal" (Vector) Params::Named(&[
         "key", "lacunarity", "hurst", "octaves", "offset", "gain", "detail",
     ]) => Scalar;
+
+    /// An algebraic surface, thesis §2.2.2: terms (i, j, k, c) of Σ c xⁱ yʲ zᵏ.
+    Polynomial = 128 "polynomial" (Vector) Params::List => Scalar;
+    /// A superquadric, thesis eq. (2.6), by ε₁ and ε₂.
+    Superquadric = 129 "superquadric" (Vector) Params::Named(&["e1", "e2"]) => Scalar;
+    /// A blobby surface, thesis eq. (2.9): kernel, threshold, far field, then (x, y, z, radius, weight) each.
+    Blobs = 130 "blobs" (Vector) Params::List => Scalar;
+    /// Two surfaces joined without a crease, thesis eq. (2.14) mended: `kind` 0 Ricci's union, 1 his
+    /// intersection, 2 a local union, 3 a local intersection; `size` is his exponent or the local width.
+    Blend = 131 "blend" (Scalar, Scalar) Params::Named(&["kind", "size"]) => Scalar;
+    /// A distance surface, thesis eq. (2.10): kernel, threshold, far field, then primitives: each its kind (0 point,
+    /// 1 line, 2 polygon, 3 quadratic B-spline, 4 arc), radius, weight, the count of its numbers, and these.
+    Distances = 132 "distances" (Vector) Params::List => Scalar;
+    /// A convolution surface, thesis eq. (2.11), of the same constants.
+    Convolution = 133 "convolution" (Vector) Params::List => Scalar;
 }
 
 impl Op {

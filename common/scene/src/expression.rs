@@ -9,7 +9,11 @@
 mod cascades;
 mod language;
 mod make;
+mod options;
 mod refusal;
+mod shapes;
+mod skeletons;
+mod solids;
 mod values;
 
 use std::cell::RefCell;

@@ -17,6 +17,7 @@ use crate::noise;
 use crate::op::Basis;
 use crate::program::fold;
 use crate::program::plan::{Act, Plan, Step};
+use crate::shape::{Shape, Within};
 use crate::surroundings::{Region, Surroundings, WORLD};
 
 /// Twice the rounding error of one operation, relative to its result.
@@ -244,6 +245,16 @@ impl<'a> Pass<'a> {
                 self.scalar(NOISE, change)
             }
             Act::Cascade(cascade) => self.cascade(cascade, arg(0)),
+            Act::Shape(shape) => match step.args[..] {
+                [_, _] => {
+                    let within = Within::of_numbers(arg(0).range(), arg(1).range());
+                    self.shape(shape, &within, arg(0).change().larger(arg(1).change()))
+                }
+                _ => {
+                    let (parts, norm) = (arg(0).parts(), arg(0).range());
+                    self.shape(shape, &Within { parts, norm }, arg(0).change())
+                }
+            },
         }
     }
 
@@ -431,6 +442,12 @@ impl<'a> Pass<'a> {
         let apart = b.range().sub(c.range()).magnitude();
         let change = b.change().larger(c.change()).plus(Change::new(apart, 0.0));
         self.scalar(b.range().hull(c.range()), change)
+    }
+
+    fn shape(&mut self, shape: &Shape, within: &Within, at: Change) -> Bound {
+        let known = shape.bound(within);
+        let change = at.times(known.slope).plus(Change::new(known.rounding, 0.0));
+        self.scalar(known.range, change)
     }
 
     /// The change of the noise where its argument changes so.

@@ -1,6 +1,7 @@
 //! The machine's code: a plan taken apart into operations on registers of lanes.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use crate::arithmetic::{Binary, Unary};
 use crate::cascade::Cascade;
@@ -9,6 +10,7 @@ use crate::noise::Lattice;
 use crate::op::Kind;
 use crate::program::CompileError;
 use crate::program::plan::{Act, Plan, Step};
+use crate::shape::Shape;
 
 /// Most registers of a program, so that its scratch memory stays below 16 MiB.
 pub(crate) const REGISTERS_MAX: usize = 4096;
@@ -32,6 +34,7 @@ pub(crate) enum Operation {
     OntoSphere(f64),
     Noise(Lattice),
     Cascade(Cascade),
+    Shape(Arc<Shape>),
 }
 
 /// One operation: unused arguments are 0, the result's register is none of the arguments'.
@@ -148,6 +151,13 @@ impl Lowering {
             }
             Act::Cascade(cascade) => {
                 return Place::Scalar(self.push(Operation::Cascade(cascade.clone()), &v(0)));
+            }
+            Act::Shape(shape) => {
+                let args = match step.args[..] {
+                    [_, _] => vec![s(0), s(1)],
+                    _ => v(0).to_vec(),
+                };
+                return Place::Scalar(self.push(Operation::Shape(shape.clone()), &args));
             }
             Act::Unary(unary) => Operation::Unary(*unary),
             Act::Binary(binary) => Operation::Binary(*binary),

@@ -57,6 +57,10 @@ pub(crate) fn constant(act: &Act, args: &[Option<Value>]) -> Option<Value> {
         Act::Power(exponent) => Value::Scalar(power(*exponent, s(0))),
         Act::SmoothStep(low, high) => Value::Scalar(smoothstep(*low, *high, s(0))),
         Act::Select => Value::Scalar(select(s(0), s(1), s(2))),
+        Act::Shape(shape) => Value::Scalar(shape.value(match args[..] {
+            [a, b] => [a.scalar(), b.scalar(), 0.0],
+            _ => v(0),
+        })),
         Act::Noise(lattice) => {
             let [(x, u), (y, v), (z, w)] = v(0).map(noise::split);
             Value::Scalar(f64::from(noise::value(

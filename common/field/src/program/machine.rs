@@ -180,6 +180,7 @@ impl Machine {
                 #[inline(always)]
                 |a| curve.value(a),
             ),
+            Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
             Operation::Noise(lattice) => {
                 let Octaves { cells, noise, .. } = &mut *self.octaves;
                 lanes::split(simd, n, [a, b, c], cells);

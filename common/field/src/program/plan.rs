@@ -1,5 +1,7 @@
 //! The operations of a field that matter, in order, with their constants digested: what every arithmetic walks over.
 
+use std::sync::Arc;
+
 use crate::arithmetic::{Binary, Unary};
 use crate::cascade::Cascade;
 use crate::curve::{Curve, Join};
@@ -9,6 +11,7 @@ use crate::noise::Lattice;
 use crate::op::{Kind, Op};
 use crate::program::CompileError;
 use crate::program::fold::{self, Value};
+use crate::shape::Shape;
 use crate::{Graph, NodeId};
 
 /// What a step does.
@@ -36,6 +39,7 @@ pub(crate) enum Act {
     Select,
     Noise(Lattice),
     Cascade(Cascade),
+    Shape(Arc<Shape>),
 }
 
 /// One operation on the results of earlier steps.
@@ -161,6 +165,9 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
     if let Some(binary) = Binary::of(node.op) {
         return Act::Binary(binary);
     }
+    if let Some(shape) = Shape::new(node.op, params) {
+        return Act::Shape(Arc::new(shape.expect("the graph checked the constants")));
+    }
     match node.op {
         Op::Constant => Act::Constant(params[0]),
         Op::Position => Act::Position,
@@ -205,7 +212,13 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::Mul
         | Op::Div
         | Op::Min
-        | Op::Max => unreachable!("functions of one and two numbers are taken above"),
+        | Op::Max
+        | Op::Polynomial
+        | Op::Superquadric
+        | Op::Blobs
+        | Op::Distances
+        | Op::Convolution
+        | Op::Blend => unreachable!("functions of numbers and shapes are taken above"),
     }
 }
 

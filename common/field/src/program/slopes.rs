@@ -225,6 +225,7 @@ impl Slopes {
                     a.chain(value, slope)
                 },
             ),
+            Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
             Operation::Noise(lattice) => {
                 let Octaves { cells, sample, .. } = &mut *self.octaves;
                 let Sample {

@@ -107,6 +107,10 @@ pub(crate) fn zoo() -> Vec<(String, Program)> {
         let product = g.push(Op::Mul, &[n, a], &[]).unwrap();
         g.push(Op::Min, &[product, b], &[]).unwrap()
     });
+    for (name, graph, root) in crate::shape::tests::zoo() {
+        let program = Program::compile(&graph, &[root], Interval::new(0.0, 1.0)).unwrap();
+        zoo.push((name, program));
+    }
     zoo
 }
 

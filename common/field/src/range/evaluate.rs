@@ -149,6 +149,10 @@ impl<T: Arithmetic> Ground<T> {
             Act::SmoothStep(low, high) => s(0).apply(Function::SmoothStep(*low, *high)),
             Act::Select => s(0).select(s(1), s(2)),
             Act::Noise(lattice) => T::noise(*lattice, v(0)),
+            Act::Shape(shape) => match step.args[..] {
+                [_, _] => T::shape(shape, [s(0), s(1), T::constant(0.0)]),
+                _ => T::shape(shape, v(0)),
+            },
             Act::Cascade(cascade) => octaves(cascade, &v(0), self.footprint),
         };
         Value::Scalar(number)

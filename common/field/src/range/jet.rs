@@ -9,6 +9,7 @@ use crate::noise::Lattice;
 use crate::number::Number;
 use crate::range::function::Function;
 use crate::range::{Arithmetic, lattice};
+use crate::shape::{Local, Shape};
 
 /// A value, its gradient and its Hessian by the three coordinates.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -145,6 +146,16 @@ impl Number for Jet {
     }
 }
 
+impl Local for Jet {
+    fn at(&self) -> f64 {
+        self.value
+    }
+
+    fn through(self, [value, slope, bend]: [f64; 3]) -> Self {
+        self.chain(value, slope, bend)
+    }
+}
+
 impl Arithmetic for Jet {
     fn any(range: Interval) -> Self {
         Self::constant(f64::any(range))
@@ -174,6 +185,10 @@ impl Arithmetic for Jet {
     fn curve(self, curve: &Curve) -> Self {
         let (value, slope, bend) = curve.value_slope_bend(self.value);
         self.chain(value, slope, bend)
+    }
+
+    fn shape(shape: &Shape, at: [Self; 3]) -> Self {
+        shape.value(at)
     }
 
     /// The value is that of evaluation to the bit; the derivatives are exact to f64.

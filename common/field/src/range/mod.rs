@@ -45,6 +45,7 @@ use crate::curve::Curve;
 use crate::interval::Interval;
 use crate::noise::Lattice;
 use crate::number::Number;
+use crate::shape::Shape;
 use function::Function;
 
 /// An arithmetic in which a whole field can be evaluated.
@@ -74,6 +75,11 @@ pub(crate) trait Arithmetic: Number {
     /// condense what no input knows, thesis eq. (5.18) and §5.4.2.
     fn settled(self, _inputs: &[Self; 3]) -> Self {
         self
+    }
+
+    /// A shape of thesis chapter 2 at a place, or two numbers joined.
+    fn shape(shape: &Shape, at: [Self; 3]) -> Self {
+        shape.enclosed(at)
     }
 
     /// Gradient noise at a place, thesis eq. (4.9).

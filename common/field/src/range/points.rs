@@ -5,6 +5,7 @@ use crate::interval::Interval;
 use crate::noise::{self, Lattice};
 use crate::range::Arithmetic;
 use crate::range::function::Function;
+use crate::shape::Shape;
 
 impl Arithmetic for f64 {
     fn any(range: Interval) -> Self {
@@ -37,6 +38,10 @@ impl Arithmetic for f64 {
 
     fn curve(self, curve: &Curve) -> Self {
         curve.value(self)
+    }
+
+    fn shape(shape: &Shape, at: [Self; 3]) -> Self {
+        shape.value(at)
     }
 
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {

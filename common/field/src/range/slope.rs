@@ -10,6 +10,7 @@ use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::Function;
 use crate::range::interval::curve_over;
+use crate::shape::Shape;
 
 /// All values of a function over a region, and all of its derivatives by `N` variables.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -165,6 +166,21 @@ impl<const N: usize> Arithmetic for Slope<N> {
     fn apply(self, function: Function) -> Self {
         let slopes = function.slopes(self.value);
         self.chain(function.image(self.value), slopes)
+    }
+
+    /// What is known of the shape's slope, along the way on which a variable carries the place.
+    fn shape(shape: &Shape, at: [Self; 3]) -> Self {
+        let known = shape.known(at.map(|part| part.value));
+        let enclosed = shape.enclosed(at);
+        let mut slopes = enclosed.slopes;
+        for (i, slope) in slopes.iter_mut().enumerate() {
+            let rates = at.map(|part| part.slopes[i].magnitude());
+            let most = shape.carried(known.slope, rates);
+            if most.is_finite() {
+                *slope = slope.meet(Interval::new(-most, most));
+            }
+        }
+        Self { slopes, ..enclosed }
     }
 
     fn curve(self, curve: &Curve) -> Self {

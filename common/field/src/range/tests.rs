@@ -254,7 +254,13 @@ fn over_segments(count: u32, mut check: impl FnMut(&Segment, &[(f64, Place)])) {
 #[test]
 fn every_field_stays_within_its_ranges_along_segments() {
     let (mut spans, mut forms) = (0.0, 0.0);
+    // Most shapes are known by their bounds alone, and those are intervals.
+    let shapes: Vec<String> = crate::shape::tests::zoo()
+        .into_iter()
+        .map(|(name, ..)| name)
+        .collect();
     for (name, program) in zoo() {
+        let bounded_alone = shapes.contains(&name);
         over_segments(500, |segment, places| {
             let interval = program.along_interval(segment);
             let reduced = program.along_reduced(segment);
@@ -279,7 +285,11 @@ fn every_field_stays_within_its_ranges_along_segments() {
                     told()
                 );
             }
-            if segment.t.width() < 0.02 && interval.magnitude() < 100.0 && reduced.error < 100.0 {
+            if !bounded_alone
+                && segment.t.width() < 0.02
+                && interval.magnitude() < 100.0
+                && reduced.error < 100.0
+            {
                 spans += interval.width();
                 forms += reduced.interval().width();
             }

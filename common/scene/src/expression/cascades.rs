@@ -5,8 +5,8 @@ use field::{Basis, Op};
 use rhai::{Dynamic, Map};
 
 use super::Shared;
+use super::options::Options;
 use super::values::{Made, Operand, refuse};
-use crate::file::nearest;
 
 /// A cascade's name, what it does, and what its options are where they are not given.
 pub(super) struct Cascade {
@@ -84,7 +84,7 @@ impl Cascade {
     fn options(&self) -> &'static [&'static str] {
         match self.op.signature().params {
             Params::Named(names) => names,
-            Params::Keys => unreachable!("a cascade has named options"),
+            Params::Keys | Params::List => unreachable!("a cascade has named options"),
         }
     }
 }
@@ -101,13 +101,7 @@ impl Shared {
         let name = cascade.name;
         let at = Self::vector(name, at)?;
         let known = cascade.options();
-        if let Some(unknown) = options.keys().find(|key| !known.contains(&key.as_str())) {
-            let help = match nearest(unknown, known.iter().copied()) {
-                Some(near) => format!("did you mean `{near}`?"),
-                None => format!("its options are {}", known.join(", ")),
-            };
-            return refuse(format!("`{name}` has no option `{unknown}`"), help);
-        }
+        Options::new(name, known, options)?;
         let params = known
             .iter()
             .map(|option| match options.get(*option) {

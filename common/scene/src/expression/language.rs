@@ -9,6 +9,8 @@ use rhai::{Array, Dynamic, Engine, FLOAT, INT, Map, OptimizationLevel};
 use super::Shared;
 use super::cascades::CASCADES;
 use super::refusal;
+use super::shapes;
+use super::solids;
 use super::values::{Made, Scalar, Vector, refuse};
 
 /// Names that mean something without having been defined.
@@ -40,6 +42,19 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "mix",
     "select",
     "len",
+    "polynomial",
+    "superquadric",
+    "sphere",
+    "blobs",
+    "distances",
+    "convolution",
+    "union",
+    "intersection",
+    "difference",
+    "blend",
+    "morph",
+    "twist",
+    "taper",
 ];
 
 /// Symbols that are refused while parsing; [`refusal`] says what to use instead.
@@ -87,6 +102,8 @@ pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
     comparisons(&mut engine);
     functions(&mut engine, shared);
     cascades(&mut engine, shared);
+    shapes::register(&mut engine, shared);
+    solids::register(&mut engine, shared);
     names(&mut engine, shared);
     engine
 }

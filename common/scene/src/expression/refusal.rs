@@ -255,6 +255,22 @@ fn usage(name: &str) -> String {
         "smoothstep" => "smoothstep(low, high, x)",
         "mix" => "mix(a, b, u)",
         "select" => "select(c, a, b): a where c < 0, else b",
+        "polynomial" => "polynomial([[i, j, k, c], ...]): c x**i y**j z**k and so on",
+        "superquadric" => "superquadric(#{e1: 1, e2: 1, size: [1, 1, 1]})",
+        "sphere" => "sphere(#{radius: 1, exponent: 0.5})",
+        "blobs" => "blobs([[x, y, z, radius, weight], ...], #{kernel: \"wyvill\"})",
+        "distances" | "convolution" => {
+            return format!(
+                "it is used like {name}([#{{line: [[0, 0, 0], [1, 0, 0]]}}], #{{radius: 0.5}})"
+            );
+        }
+        "union" | "intersection" | "difference" => {
+            return format!("it is used like {name}(a, b) or {name}(a, b, #{{width: 0.2}})");
+        }
+        "blend" => "blend(a, b, width)",
+        "morph" => "morph(a, b, u)",
+        "twist" => "twist(p, radians per metre)",
+        "taper" => "taper(p, #{low: -1, high: 1, scale: [1, 0.5]})",
         "length" | "onto_plane" => return format!("it is used like {name}(p)"),
         other => return format!("it is used like {other}(x)"),
     };

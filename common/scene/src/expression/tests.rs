@@ -148,6 +148,121 @@ fn cascades_take_options() {
 }
 
 #[test]
+fn shapes_take_places_lists_and_options() {
+    for (text, graph) in [
+        ("polynomial([[2, 0, 0, 1], [0, 0, 1, -1]])", "polynomial(p)"),
+        ("superquadric()", "superquadric(p)"),
+        (
+            "superquadric(2*p, #{e1: 0.5, size: [1, 2, 2]})",
+            "superquadric(vec(((p*2).x*1), ((p*2).y*0.5), ((p*2).z*0.5)))",
+        ),
+        ("sphere(#{radius: 2})", "(length(p) - 2)"),
+        (
+            "sphere(p, #{radius: 2, exponent: 1})",
+            "((2*pow(dot((p*0.5), (p*0.5)))) - 2)",
+        ),
+        ("blobs([[0, 0, 0], [1, 0, 0, 2, -1]])", "blobs(p)"),
+        (
+            "blobs(p/2, [[0, 0, 0]], #{kernel: \"blinn\", threshold: 0.2})",
+            "blobs((p*0.5))",
+        ),
+        (
+            "distances([#{point: [0, 0, 0]}, #{line: [[0, 0, 0], [1, 0, 0]], radius: 2}])",
+            "distances(p)",
+        ),
+        (
+            "convolution(p/2, [#{arc: [[0, 0, 0], [1, 0, 0], [0, 0, 1]], angle: PI}], #{kernel: \"cauchy\"})",
+            "convolution((p*0.5))",
+        ),
+        ("union(p.x, p.y)", "min(p.x, p.y)"),
+        ("intersection([p.x, p.y, p.z])", "max(max(p.x, p.y), p.z)"),
+        (
+            "difference(p.x, p.y, #{width: 0.1})",
+            "blend(p.x, neg(p.y))",
+        ),
+        ("blend(p.x, p.y, 0.1)", "blend(p.x, p.y)"),
+        ("morph(p.x, p.y, 0.25)", "(p.x + ((p.y - p.x)*0.25))"),
+        (
+            "length(twist(p, 2))",
+            "length(vec(((p.x*cos((p.z*2))) + (p.y*sin((p.z*2)))), ((p.y*cos((p.z*2))) - (p.x*sin((p.z*2)))), p.z))",
+        ),
+    ] {
+        assert_eq!(read(text), graph, "{text}");
+    }
+    for (text, message) in [
+        (
+            "polynomial([[2, 0, 0]])",
+            "a term of `polynomial` has four numbers, not 3",
+        ),
+        (
+            "polynomial([3])",
+            "`polynomial` wants a list here, not a number",
+        ),
+        (
+            "polynomial([[p.x, 0, 0, 1]])",
+            "`polynomial` wants a constant number here, not a field",
+        ),
+        (
+            "blobs([])",
+            "`blobs` wants points of five numbers: a place, a radius and a weight, not 0",
+        ),
+        (
+            "blobs([[0, 0, 0, -1]])",
+            "`blobs` wants radii from a millionth to a hundred million, not -1",
+        ),
+        (
+            "blobs([[0, 0, 0]], #{kernel: \"wyvil\"})",
+            "`blobs` has no kernel `wyvil`",
+        ),
+        (
+            "blobs([[0, 0, 0]], #{far: 1})",
+            "`blobs: far` wants true or false",
+        ),
+        ("blobs(3)", "`blobs` does not take (a number)"),
+        (
+            "superquadric(#{e1: 3})",
+            "`superquadric` wants exponents from 1/16 to 2, not 3",
+        ),
+        ("superquadric(#{e: 3})", "`superquadric` has no option `e`"),
+        (
+            "convolution([#{point: [0, 0, 0]}], #{kernel: \"wyvill\"})",
+            "`convolution` wants the kernel murakami or cauchy: others have no closed form, not 2",
+        ),
+        (
+            "distances([#{line: [[0, 0, 0], [1, 0]]}])",
+            "`distances: line` wants places of three numbers, not 2",
+        ),
+        (
+            "distances([#{polygon: [[0, 0, 0], [2, 0, 0], [0.5, 0.5, 0], [0, 2, 0]]}])",
+            "`distances` wants a convex polygon, not -1.2649110640673515",
+        ),
+        (
+            "distances([#{lin: [[0, 0, 0], [1, 0]]}])",
+            "`distances` has no option `lin`",
+        ),
+        (
+            "distances([[0, 0, 0]])",
+            "`distances` wants maps that each hold a primitive",
+        ),
+        (
+            "union(p.x, p.y, #{width: 1, sharpness: 2})",
+            "`union` takes a sharpness or a width, not both",
+        ),
+        ("union(p, p.y)", "`union` wants a number here, not a vector"),
+        (
+            "blend(p.x, p.y, -1)",
+            "`blend` wants a width above 0, not -1",
+        ),
+        (
+            "length(taper(p, #{low: 1, high: 0}))",
+            "`taper` wants its low below its high, not 1 and 0",
+        ),
+    ] {
+        assert_eq!(refused(text).message, message, "{text}");
+    }
+}
+
+#[test]
 fn what_rhai_gets_silently_wrong_is_refused_with_a_way_out() {
     let select = Some("use select(c, a, b): a where c < 0, else b");
     for (text, message, help) in [

@@ -1,0 +1,138 @@
+//! The shapes of thesis chapter 2: implicit functions with parameters of their own.
+//!
+//! A shape is one operation of a graph: a function of a place (or of two numbers, where it joins
+//! surfaces) with its list of constants. Each is written once, over [`Local`] numbers, and states
+//! its range and its slope over a region. What the constants mean is said where the shape is made.
+
+mod blend;
+mod blobs;
+mod convolution;
+mod distance;
+mod kernel;
+mod local;
+mod polynomial;
+mod roots;
+mod skeleton;
+mod sum;
+mod superquadric;
+mod supports;
+mod within;
+
+#[cfg(test)]
+pub(crate) mod tests;
+
+use crate::interval::{Interval, larger};
+use crate::op::Op;
+use crate::range::Arithmetic;
+use blend::Blend;
+use blobs::Blobs;
+use convolution::Convolution;
+use distance::Distances;
+pub(crate) use local::Local;
+use polynomial::Polynomial;
+use superquadric::Superquadric;
+pub(crate) use within::{Known, Within};
+
+/// Why parameters are refused: what is wanted, and what was given.
+pub(crate) type Refusal = (&'static str, f64);
+
+/// A shape, its constants digested.
+#[derive(Clone, PartialEq, Debug)]
+pub(crate) enum Shape {
+    Polynomial(Polynomial),
+    Superquadric(Superquadric),
+    Blobs(Blobs),
+    Distances(Distances),
+    Convolution(Convolution),
+    Blend(Blend),
+}
+
+impl Shape {
+    /// The shape of an operation; `None` if the operation is none.
+    pub(crate) fn new(op: Op, params: &[f64]) -> Option<Result<Self, Refusal>> {
+        Some(match op {
+            Op::Polynomial => Polynomial::new(params).map(Self::Polynomial),
+            Op::Superquadric => Superquadric::new(params).map(Self::Superquadric),
+            Op::Blobs => Blobs::new(params).map(Self::Blobs),
+            Op::Distances => Distances::new(params).map(Self::Distances),
+            Op::Convolution => Convolution::new(params).map(Self::Convolution),
+            Op::Blend => Blend::new(params).map(Self::Blend),
+            _ => return None,
+        })
+    }
+
+    /// Its value at a place; a blend takes the first two numbers.
+    #[inline]
+    pub(crate) fn value<N: Local>(&self, at: [N; 3]) -> N {
+        match self {
+            Self::Polynomial(shape) => shape.value(at),
+            Self::Superquadric(shape) => shape.value(at),
+            Self::Blobs(shape) => shape.value(at),
+            Self::Distances(shape) => shape.value(at),
+            Self::Convolution(shape) => shape.value(at),
+            Self::Blend(shape) => {
+                let [a, b, _] = at;
+                shape.value(a, b)
+            }
+        }
+    }
+
+    /// What is known over a region. The slope is per unit of the place, of a blend per unit of the larger change.
+    pub(crate) fn bound(&self, within: &Within) -> Known {
+        match self {
+            Self::Polynomial(shape) => shape.bound(within),
+            Self::Superquadric(shape) => shape.bound(within),
+            Self::Blobs(shape) => shape.bound(within),
+            Self::Distances(shape) => shape.bound(within),
+            Self::Convolution(shape) => shape.bound(within),
+            Self::Blend(shape) => {
+                let [a, b, _] = within.parts;
+                Known {
+                    range: shape.range(a, b),
+                    slope: shape.stretch(),
+                    rounding: shape.rounding(a, b),
+                }
+            }
+        }
+    }
+}
+
+impl Shape {
+    /// What is known over a box of places, or over the values of two numbers.
+    pub(crate) fn known(&self, parts: [Interval; 3]) -> Known {
+        let norm = Interval::new(0.0, f64::INFINITY);
+        self.bound(&Within { parts, norm })
+    }
+
+    /// Its value in an arithmetic of ranges: a polynomial keeps what its parts know of each other.
+    pub(crate) fn enclosed<T: Arithmetic>(&self, at: [T; 3]) -> T {
+        let known = self.known(at.each_ref().map(T::range));
+        match self {
+            Self::Polynomial(shape) => shape.value(at).within(known.range),
+            _ => T::any(known.range),
+        }
+    }
+
+    /// How fast the value can change where its arguments change that fast.
+    pub(crate) fn carried(&self, slope: f64, [x, y, z]: [f64; 3]) -> f64 {
+        let rate = match self {
+            Self::Blend(_) => larger(x, y),
+            _ => (x * x + y * y + z * z).sqrt(),
+        };
+        if rate == 0.0 {
+            0.0
+        } else {
+            slope * rate * (1.0 + 1e-12)
+        }
+    }
+}
+
+impl Within {
+    /// The values of two numbers.
+    pub(crate) fn of_numbers(a: Interval, b: Interval) -> Self {
+        Self {
+            parts: [a, b, Interval::point(0.0)],
+            norm: Interval::new(0.0, f64::INFINITY),
+        }
+    }
+}
