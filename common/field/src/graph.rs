@@ -3,8 +3,10 @@
 //! There is no tree anywhere, in memory or on the wire: `x = x + x` repeated
 //! sixty-four times is sixty-five nodes.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
+use std::sync::Arc;
 
+use crate::grid::{Samples, recipe};
 use crate::op::{Basis, Kind, Op, Params};
 use crate::shape::Shape;
 
@@ -78,6 +80,8 @@ pub struct Graph {
     nodes: Vec<Node>,
     depths: Vec<u32>,
     known: HashMap<(Op, Vec<NodeId>, Vec<u64>), NodeId>,
+    /// The samples of files, by the numbers that nodes know them by: no part of what the field is called.
+    files: BTreeMap<u32, Arc<Samples>>,
 }
 
 impl PartialEq for Graph {
@@ -126,6 +130,26 @@ impl Graph {
     /// The constant `value`.
     pub fn constant(&mut self, value: f64) -> Result<NodeId, GraphError> {
         self.push(Op::Constant, &[], &[value])
+    }
+
+    /// Gives the samples of a file, by the number that nodes know it by: a field can only be compiled where
+    /// the files are that it needs.
+    pub fn attach(&mut self, file: u32, samples: Arc<Samples>) {
+        self.files.insert(file, samples);
+    }
+
+    /// The files that were attached.
+    pub fn files(&self) -> &BTreeMap<u32, Arc<Samples>> {
+        &self.files
+    }
+
+    /// The numbers of the files that nodes need.
+    pub fn files_needed(&self) -> Vec<u32> {
+        let grids = self.nodes.iter().filter(|node| node.op == Op::Grid);
+        let mut files: Vec<u32> = grids.map(recipe::file).collect();
+        files.sort_unstable();
+        files.dedup();
+        files
     }
 
     /// All nodes; each stands after its arguments.
@@ -217,6 +241,9 @@ fn check_ranges(op: Op, params: &[f64]) -> Result<(), GraphError> {
             }
             _ => {}
         }
+    }
+    if let Some((wanted, value)) = recipe::complaint(op, params) {
+        return refuse(wanted, value);
     }
     match op {
         Op::SmoothStep if params[0] >= params[1] => {

@@ -9,6 +9,7 @@ mod cascade;
 pub mod curve;
 pub mod fft;
 pub mod graph;
+pub mod grid;
 pub mod hash;
 pub mod interval;
 mod lanes;

@@ -196,6 +196,18 @@ ops! {
     Distances = 132 "distances" (Vector) Params::List => Scalar;
     /// A convolution surface, thesis eq. (2.11), of the same constants.
     Convolution = 133 "convolution" (Vector) Params::List => Scalar;
+
+    /// The samples of file number `asset` at a place counted in samples: [`crate::grid`].
+    Grid = 192 "grid" (Vector) Params::Named(&["asset", "edges", "degree"]) => Scalar;
+    /// fBm of unit variance by spectral synthesis, thesis eq. (3.27) mended, periodic over `size` samples.
+    SpectralTerrain = 193 "spectral_terrain" (Vector)
+        Params::Named(&["axes", "size", "hurst", "key", "degree"]) => Scalar;
+    /// Heights in metres of a sea by Pierson and Moskowitz, periodic over `size` samples, `cell` metres apart.
+    Sea = 194 "sea" (Vector)
+        Params::Named(&["size", "cell", "wind", "direction", "key", "degree"]) => Scalar;
+    /// fBm by midpoint subdivision, thesis eqs. (3.28)–(3.33), bounded, over 2^levels samples.
+    MidpointTerrain = 195 "midpoint_terrain" (Vector)
+        Params::Named(&["levels", "mesh", "additions", "hurst", "key", "degree"]) => Scalar;
 }
 
 impl Op {

@@ -46,6 +46,12 @@ pub enum CompileError {
     /// Too many intermediate results are alive at once.
     #[error("the field keeps {0} intermediate results at once; the most is 4096")]
     TooWide(usize),
+    /// Its grids are too large.
+    #[error("the grids of the fields have more than {max} samples together", max = crate::grid::SAMPLES_MAX)]
+    TooManySamples,
+    /// A grid's file was not attached.
+    #[error("the samples of file number {0} are not here")]
+    NoFile(u32),
 }
 
 impl Program {

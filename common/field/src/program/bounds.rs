@@ -12,6 +12,7 @@
 use crate::arithmetic::{Binary, Unary};
 use crate::cascade::{self, Cascade, Model, Octave};
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::interval::{Interval, larger, smaller};
 use crate::noise;
 use crate::op::Basis;
@@ -255,6 +256,12 @@ impl<'a> Pass<'a> {
                     self.shape(shape, &Within { parts, norm }, arg(0).change())
                 }
             },
+            Act::Grid(surface) => {
+                let (range, slopes) = surface.over(arg(0).parts());
+                let rounding = Change::new(2.0 * surface.blur(range), 0.0);
+                let change = arg(0).change().times(Surface::steepest(slopes));
+                self.scalar(range, change.plus(rounding))
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use crate::arithmetic::{Binary, Unary};
 use crate::cascade::Cascade;
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::noise::Lattice;
 use crate::op::Kind;
 use crate::program::CompileError;
@@ -35,6 +36,7 @@ pub(crate) enum Operation {
     Noise(Lattice),
     Cascade(Cascade),
     Shape(Arc<Shape>),
+    Grid(Arc<Surface>),
 }
 
 /// One operation: unused arguments are 0, the result's register is none of the arguments'.
@@ -158,6 +160,9 @@ impl Lowering {
                     _ => v(0).to_vec(),
                 };
                 return Place::Scalar(self.push(Operation::Shape(shape.clone()), &args));
+            }
+            Act::Grid(surface) => {
+                return Place::Scalar(self.push(Operation::Grid(surface.clone()), &v(0)));
             }
             Act::Unary(unary) => Operation::Unary(*unary),
             Act::Binary(binary) => Operation::Binary(*binary),

@@ -61,6 +61,7 @@ pub(crate) fn constant(act: &Act, args: &[Option<Value>]) -> Option<Value> {
             [a, b] => [a.scalar(), b.scalar(), 0.0],
             _ => v(0),
         })),
+        Act::Grid(surface) => Value::Scalar(surface.value(v(0))),
         Act::Noise(lattice) => {
             let [(x, u), (y, v), (z, w)] = v(0).map(noise::split);
             Value::Scalar(f64::from(noise::value(

@@ -181,6 +181,13 @@ impl Machine {
                 |a| curve.value(a),
             ),
             Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
+            Operation::Grid(surface) => each3(
+                n,
+                [a, b, c],
+                out,
+                #[inline(always)]
+                |a, b, c| surface.value([a, b, c]),
+            ),
             Operation::Noise(lattice) => {
                 let Octaves { cells, noise, .. } = &mut *self.octaves;
                 lanes::split(simd, n, [a, b, c], cells);

@@ -6,6 +6,7 @@ use crate::arithmetic::{Binary, Unary};
 use crate::cascade::Cascade;
 use crate::curve::{Curve, Join};
 use crate::graph::Node;
+use crate::grid::{SAMPLES_MAX, Surface, recipe};
 use crate::interval::{Interval, larger};
 use crate::noise::Lattice;
 use crate::op::{Kind, Op};
@@ -40,6 +41,7 @@ pub(crate) enum Act {
     Noise(Lattice),
     Cascade(Cascade),
     Shape(Arc<Shape>),
+    Grid(Arc<Surface>),
 }
 
 /// One operation on the results of earlier steps.
@@ -70,11 +72,17 @@ impl Plan {
                 Some(node) => return Err(CompileError::Vector(node.op.signature().name)),
             }
         }
+        let size = |file| Some(graph.files().get(&file)?.values().len());
+        let samples = graph.nodes().iter().map(|node| recipe::count(node, size));
+        if samples.fold(0usize, usize::saturating_add) > SAMPLES_MAX {
+            return Err(CompileError::TooManySamples);
+        }
         let mut steps = Vec::with_capacity(graph.nodes().len());
         let mut known: Vec<Known> = Vec::with_capacity(graph.nodes().len());
         for node in graph.nodes() {
             let args: Vec<&Known> = node.args.iter().map(|arg| &known[arg.index()]).collect();
-            let (step, fact) = digest(node, &args, time);
+            let surface = surface_of(graph, node)?;
+            let (step, fact) = digest(node, surface, &args, time);
             steps.push(step);
             known.push(fact);
         }
@@ -121,10 +129,29 @@ struct Known {
     scale: f64,
 }
 
-fn digest(node: &Node, args: &[&Known], time: Interval) -> (Step, Known) {
+/// The grid of a node that has one.
+fn surface_of(graph: &Graph, node: &Node) -> Result<Option<Arc<Surface>>, CompileError> {
+    if node.op != Op::Grid {
+        return Ok(recipe::synthesised(node));
+    }
+    let file = recipe::file(node);
+    let samples = graph.files().get(&file);
+    let samples = samples.ok_or(CompileError::NoFile(file))?;
+    Ok(Some(recipe::of_file(node, samples)))
+}
+
+fn digest(
+    node: &Node,
+    surface: Option<Arc<Surface>>,
+    args: &[&Known],
+    time: Interval,
+) -> (Step, Known) {
     let kind = node.op.signature().result;
     let scale = scale_of(node, args);
-    let act = act_of(node, args);
+    let act = match surface {
+        Some(surface) => Act::Grid(surface),
+        None => act_of(node, args),
+    };
     let over_time = over_time(&act, args, time);
     let constant = match over_time {
         Some(Interval { low, high }) if low == high => Some(Value::Scalar(low)),
@@ -219,6 +246,9 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::Distances
         | Op::Convolution
         | Op::Blend => unreachable!("functions of numbers and shapes are taken above"),
+        Op::Grid | Op::SpectralTerrain | Op::Sea | Op::MidpointTerrain => {
+            unreachable!("grids have surfaces")
+        }
     }
 }
 

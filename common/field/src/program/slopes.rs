@@ -226,6 +226,16 @@ impl Slopes {
                 },
             ),
             Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
+            Operation::Grid(surface) => each3(
+                n,
+                [a, b, c],
+                out,
+                #[inline(always)]
+                |a, b, c| {
+                    let (value, slopes) = surface.value_gradient([a.value, b.value, c.value]);
+                    pull(slopes, [a, b, c], value)
+                },
+            ),
             Operation::Noise(lattice) => {
                 let Octaves { cells, sample, .. } = &mut *self.octaves;
                 let Sample {

@@ -97,6 +97,12 @@ pub(crate) fn zoo() -> Vec<(String, Program)> {
             .unwrap()
         });
     }
+    for (name, op, params) in grids() {
+        add(name, &|g| {
+            let p = scaled(g, 2.3);
+            g.push(op, &[p], params).unwrap()
+        });
+    }
     add("planet", &|g| planet(g, 3.0));
     add("warp", &|g| {
         let p = scaled(g, 1.0);
@@ -112,6 +118,34 @@ pub(crate) fn zoo() -> Vec<(String, Program)> {
         zoo.push((name, program));
     }
     zoo
+}
+
+/// Small grids of every recipe, degree and kind of edge.
+fn grids() -> [(&'static str, Op, &'static [f64]); 6] {
+    [
+        (
+            "spectral cubic",
+            Op::SpectralTerrain,
+            &[2.0, 16.0, 0.8, 1.0, 3.0],
+        ),
+        (
+            "spectral quadratic",
+            Op::SpectralTerrain,
+            &[2.0, 8.0, 0.4, 2.0, 2.0],
+        ),
+        ("flakes", Op::SpectralTerrain, &[3.0, 8.0, 0.7, 3.0, 3.0]),
+        ("sea", Op::Sea, &[32.0, 2.0, 9.0, 0.5, 4.0, 2.0]),
+        (
+            "midpoints",
+            Op::MidpointTerrain,
+            &[3.0, 0.0, 0.0, 0.8, 5.0, 3.0],
+        ),
+        (
+            "additions",
+            Op::MidpointTerrain,
+            &[2.0, 1.0, 1.0, 0.5, 6.0, 2.0],
+        ),
+    ]
 }
 
 pub(crate) fn position(g: &mut Graph) -> [NodeId; 3] {

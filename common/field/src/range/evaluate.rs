@@ -154,6 +154,7 @@ impl<T: Arithmetic> Ground<T> {
                 _ => T::shape(shape, v(0)),
             },
             Act::Cascade(cascade) => octaves(cascade, &v(0), self.footprint),
+            Act::Grid(surface) => T::grid(surface, v(0)),
         };
         Value::Scalar(number)
     }

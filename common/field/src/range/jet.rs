@@ -4,6 +4,7 @@
 
 use crate::arithmetic::{Binary, Unary};
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::interval::Interval;
 use crate::noise::Lattice;
 use crate::number::Number;
@@ -189,6 +190,23 @@ impl Arithmetic for Jet {
 
     fn shape(shape: &Shape, at: [Self; 3]) -> Self {
         shape.value(at)
+    }
+
+    fn grid(surface: &Surface, at: [Self; 3]) -> Self {
+        let bent = surface.bent(at.map(|part| part.value));
+        let mut result = Self::constant(bent.value);
+        for (i, a) in at.iter().enumerate() {
+            result = result.mixed(*a, bent.value, 1.0, bent.gradient[i]);
+            for (j, b) in at.iter().enumerate() {
+                let bend = bent.hessian[i][j];
+                for (row, g) in result.hessian.iter_mut().zip(a.gradient) {
+                    for (entry, h) in row.iter_mut().zip(b.gradient) {
+                        *entry += bend * (g * h);
+                    }
+                }
+            }
+        }
+        result
     }
 
     /// The value is that of evaluation to the bit; the derivatives are exact to f64.

@@ -25,6 +25,7 @@ pub(crate) mod affine;
 mod evaluate;
 mod form;
 pub(crate) mod function;
+mod grid;
 mod interval;
 mod jet;
 mod lattice;
@@ -42,6 +43,7 @@ pub use reduced::Reduced;
 pub use slope::Slope;
 
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::interval::Interval;
 use crate::noise::Lattice;
 use crate::number::Number;
@@ -85,5 +87,10 @@ pub(crate) trait Arithmetic: Number {
     /// Gradient noise at a place, thesis eq. (4.9).
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
         lattice::gradient_noise(lattice, at)
+    }
+
+    /// A discrete surface at a place.
+    fn grid(surface: &Surface, at: [Self; 3]) -> Self {
+        grid::mean_value(surface, at)
     }
 }

@@ -1,6 +1,7 @@
 //! Points among the arithmetics: the definition that all others are checked against.
 
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::interval::Interval;
 use crate::noise::{self, Lattice};
 use crate::range::Arithmetic;
@@ -42,6 +43,10 @@ impl Arithmetic for f64 {
 
     fn shape(shape: &Shape, at: [Self; 3]) -> Self {
         shape.value(at)
+    }
+
+    fn grid(surface: &Surface, at: [Self; 3]) -> Self {
+        surface.value(at)
     }
 
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {

@@ -5,6 +5,7 @@
 
 use crate::arithmetic::Unary;
 use crate::curve::Curve;
+use crate::grid::Surface;
 use crate::interval::Interval;
 use crate::number::Number;
 use crate::range::Arithmetic;
@@ -181,6 +182,16 @@ impl<const N: usize> Arithmetic for Slope<N> {
             }
         }
         Self { slopes, ..enclosed }
+    }
+
+    fn grid(surface: &Surface, at: [Self; 3]) -> Self {
+        let (value, slopes) = surface.over(at.map(|part| part.value));
+        let zero = Interval::point(0.0);
+        let mut result = Self::constant(0.0);
+        for (part, slope) in at.into_iter().zip(slopes) {
+            result = result.zip(part.chain(zero, slope), zero, Interval::add);
+        }
+        Self { value, ..result }
     }
 
     fn curve(self, curve: &Curve) -> Self {
