@@ -43,7 +43,7 @@ pub enum RenderError {
         digest: Digest,
     },
     /// The description names an asset that it does not list.
-    #[error("a ramp refers to asset number {asset}, but the scene lists {assets}")]
+    #[error("the scene refers to asset number {asset}, but lists {assets}")]
     NoSuchAsset {
         /// The number.
         asset: u32,
@@ -66,6 +66,14 @@ pub enum RenderError {
         name: String,
         /// What is wrong with it.
         reason: &'static str,
+    },
+    /// An asset is no grid of samples, or too large a one.
+    #[error("the asset `{name}` is no grid: {reason}")]
+    BadGrid {
+        /// The scene's name for it.
+        name: String,
+        /// What is wrong with it.
+        reason: String,
     },
     /// A field cannot be compiled.
     #[error("the {what} cannot be compiled")]

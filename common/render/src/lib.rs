@@ -14,6 +14,7 @@ mod assets;
 mod counts;
 mod error;
 mod film;
+mod grids;
 mod places;
 mod renderer;
 mod sample;

@@ -11,6 +11,7 @@ use crate::assets::Assets;
 use crate::counts::Counts;
 use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
+use crate::grids;
 use crate::places::Places;
 use crate::sample::spline::FILTER_ORDER_MAX;
 use crate::sample::strata::RAYS_MAX;
@@ -80,6 +81,8 @@ impl ImageRenderer {
         if order == 0 && rays != 1 {
             return Err(RenderError::CentreAlone { rays });
         }
+        let attached = grids::attached(description, assets)?;
+        let description = attached.as_ref();
         let start = f64::from(image.0) / film.fps;
         let view = View::new(&description.camera, film, start);
         let (start, end) = view.instants();

@@ -77,6 +77,9 @@ impl Description {
 /// The nodes that the roots need, arguments before their users, and where each went.
 fn reorder(graph: &Graph, roots: &[NodeId]) -> (Graph, Vec<Option<NodeId>>) {
     let mut ordered = Graph::new();
+    for (file, samples) in graph.files() {
+        ordered.attach(*file, samples.clone());
+    }
     let mut places: Vec<Option<NodeId>> = vec![None; graph.nodes().len()];
     for &root in roots {
         // A node leaves the stack once all its arguments have left it.

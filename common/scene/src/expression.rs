@@ -7,6 +7,7 @@
 //! field points to `select`.
 
 mod cascades;
+mod grids;
 mod language;
 mod make;
 mod options;
@@ -25,6 +26,7 @@ use rhai::{Dynamic, Engine};
 
 use crate::curve::Curve;
 use crate::description::Seed;
+use crate::file::Files;
 use values::Operand;
 
 /// Most bytes of an expression.
@@ -53,15 +55,32 @@ struct Shared {
     seed: Seed,
     curves: BTreeMap<String, Curve>,
     used: RefCell<BTreeSet<String>>,
+    /// Where files are read from, if an expression may name any.
+    files: Option<Rc<Files>>,
 }
 
 impl Fields {
+    /// Of expressions that name no files.
     pub(crate) fn new(seed: Seed, curves: BTreeMap<String, Curve>) -> Self {
+        Self::of(seed, curves, None)
+    }
+
+    /// Of expressions that may name files.
+    pub(crate) fn with_files(
+        seed: Seed,
+        curves: BTreeMap<String, Curve>,
+        files: Rc<Files>,
+    ) -> Self {
+        Self::of(seed, curves, Some(files))
+    }
+
+    fn of(seed: Seed, curves: BTreeMap<String, Curve>, files: Option<Rc<Files>>) -> Self {
         let shared = Rc::new(Shared {
             graph: RefCell::default(),
             seed,
             curves,
             used: RefCell::default(),
+            files,
         });
         Self {
             engine: language::engine(&shared),

@@ -19,6 +19,7 @@ mod tree;
 use std::path::Path;
 use std::sync::Arc;
 
+pub(crate) use assets::Files;
 pub(crate) use keys::{Key, Presence, SCENE, Shape};
 pub use mistake::{Mistake, Place, SceneError, Source};
 pub use overrides::Overrides;

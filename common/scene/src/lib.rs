@@ -12,6 +12,7 @@ pub mod curve;
 pub mod description;
 mod expression;
 mod file;
+pub mod grid_file;
 mod ground;
 pub mod rules;
 mod schema;

@@ -2,6 +2,7 @@
 
 mod analytic;
 mod golden;
+mod grids;
 mod guarantee;
 mod same;
 mod scenes;

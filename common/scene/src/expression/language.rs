@@ -8,6 +8,7 @@ use rhai::{Array, Dynamic, Engine, FLOAT, INT, Map, OptimizationLevel};
 
 use super::Shared;
 use super::cascades::CASCADES;
+use super::grids;
 use super::refusal;
 use super::shapes;
 use super::solids;
@@ -25,6 +26,12 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "altitude1",
     "altitude2",
     "ridged_multifractal",
+    "heightmap",
+    "volume",
+    "spectral_terrain",
+    "spectral_flakes",
+    "sea",
+    "midpoint_terrain",
     "length",
     "dot",
     "vec",
@@ -104,6 +111,7 @@ pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
     cascades(&mut engine, shared);
     shapes::register(&mut engine, shared);
     solids::register(&mut engine, shared);
+    grids::register(&mut engine, shared);
     names(&mut engine, shared);
     engine
 }

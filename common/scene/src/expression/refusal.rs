@@ -246,6 +246,13 @@ fn usage(name: &str) -> String {
         "fbm" | "turbulence" | "ridged" | "altitude1" | "altitude2" | "ridged_multifractal" => {
             return format!("it is used like {name}(p, #{{octaves: 8, hurst: 0.8}})");
         }
+        "heightmap" => "heightmap(\"file.png\", p, #{spacing: 10, low: 0, high: 1000})",
+        "volume" => "volume(\"file.grid\", p, #{spacing: 1})",
+        "spectral_terrain" | "spectral_flakes" => {
+            return format!("it is used like {name}(p, #{{size: 128, spacing: 1, hurst: 0.8}})");
+        }
+        "sea" => "sea(p, #{size: 256, spacing: 1, wind: 10})",
+        "midpoint_terrain" => "midpoint_terrain(p, #{levels: 8, width: 1000, hurst: 0.8})",
         "dot" => "dot(a, b)",
         "vec" => "vec(x, y, z)",
         "onto_sphere" => "onto_sphere(p, radius)",

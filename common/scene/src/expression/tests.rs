@@ -490,3 +490,40 @@ fn curves_that_are_used_are_known() {
     fields.field("wave*p.x").unwrap();
     assert_eq!(fields.unused_curves(), ["four"]);
 }
+
+#[test]
+fn grids_are_recipes_with_options() {
+    let fields = fields();
+    for text in [
+        "spectral_terrain(p)",
+        "spectral_terrain(p, #{size: 64, spacing: 10, height: 300, hurst: 0.7, key: 3})",
+        "spectral_flakes(p, #{size: 16})",
+        "sea(p, #{size: 64, wind: 12, direction: 30})",
+        "midpoint_terrain(p, #{levels: 5, width: 100, mesh: \"triangles\", displace: \"all\"})",
+    ] {
+        assert!(
+            fields.field(text).is_ok(),
+            "{text}: {:?}",
+            fields.field(text)
+        );
+    }
+    for (text, said) in [
+        ("spectral_terrain(p, #{size: 100})", "power of two"),
+        ("spectral_terrain(p, #{hurst: 1.5})", "Hurst"),
+        ("spectral_terrain(p, #{spacing: 0})", "above 0"),
+        ("spectral_terrain(p, #{spaceing: 1})", "spacing"),
+        ("spectral_terrain(p.x)", "vector"),
+        ("sea(p, #{wind: 1000})", "wind"),
+        ("midpoint_terrain(p, #{levels: 40})", "levels"),
+        ("midpoint_terrain(p, #{mesh: \"hexagons\"})", "triangles"),
+        ("midpoint_terrain(p, #{mesh: 3})", "triangles"),
+        ("sea(p, #{spline: \"septic\"})", "cubic"),
+        ("heightmap(\"a.png\", p)", "names no files"),
+        ("heightmap(p)", "heightmap(\"file.png\""),
+    ] {
+        let refusal = fields.field(text).unwrap_err();
+        let whole = format!("{} {}", refusal.message, refusal.help.unwrap_or_default());
+        assert!(whole.contains(said), "{text}: {whole}");
+        assert!(refusal.position.is_some(), "{text}");
+    }
+}

@@ -1,15 +1,54 @@
 //! The files that a scene is made of: ordinary, of limited size, below the scene's folder.
 
+use std::cell::RefCell;
 use std::fs::File;
 use std::io::Read;
-use std::path::{Component, Path};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 use model::Digest;
 
 use super::FILE_BYTES_MAX;
 use crate::description::AssetRef;
-use crate::rules::ASSET_BYTES_MAX;
+use crate::rules::{ASSET_BYTES_MAX, ASSETS_MAX};
+
+/// The files that a scene names, in the order of their first mention: whoever reads the scene shares one list.
+pub(crate) struct Files {
+    folder: PathBuf,
+    read: RefCell<Vec<(AssetRef, Arc<[u8]>)>>,
+}
+
+impl Files {
+    /// None so far; all will lie below `folder`.
+    pub(crate) fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.to_owned(),
+            read: RefCell::default(),
+        }
+    }
+
+    /// The number of a file and its bytes, or a sentence that says why there are none.
+    pub(crate) fn get(&self, name: &str) -> Result<(u32, Arc<[u8]>), String> {
+        let mut read = self.read.borrow_mut();
+        let index = match read.iter().position(|(asset, _)| asset.name == name) {
+            Some(index) => index,
+            None => {
+                if read.len() >= ASSETS_MAX {
+                    return Err(format!("a scene names at most {ASSETS_MAX} files"));
+                }
+                read.push(read_asset(&self.folder, name)?);
+                read.len() - 1
+            }
+        };
+        let number = u32::try_from(index).expect("ASSETS_MAX fits");
+        Ok((number, read[index].1.clone()))
+    }
+
+    /// All of them.
+    pub(crate) fn take(&self) -> Vec<(AssetRef, Arc<[u8]>)> {
+        self.read.take()
+    }
+}
 
 /// The text of a scene file, or a sentence that says why there is none.
 pub(super) fn read_text(path: &Path) -> Result<String, String> {
@@ -25,7 +64,7 @@ pub(super) fn read_text(path: &Path) -> Result<String, String> {
 }
 
 /// A file that a scene names, by content, or a sentence that says why not.
-pub(super) fn read_asset(folder: &Path, name: &str) -> Result<(AssetRef, Arc<[u8]>), String> {
+fn read_asset(folder: &Path, name: &str) -> Result<(AssetRef, Arc<[u8]>), String> {
     let relative = Path::new(name);
     let inside = relative
         .components()

@@ -6,9 +6,10 @@ mod surface;
 
 use std::collections::BTreeMap;
 use std::path::Path;
+use std::rc::Rc;
 use std::sync::Arc;
 
-use super::assets;
+use super::assets::Files;
 use super::keys;
 use super::mistake::{Mistake, Place};
 use super::section::{Reader, Section, Text};
@@ -34,22 +35,24 @@ pub(super) fn scene(
     let root = reader.root(root, keys::SCENE);
     let seed = surface::seed(&root);
     let curves = curves(&root);
+    let files = Rc::new(Files::new(folder));
     let mut making = Making {
         reader,
-        folder,
-        fields: Fields::new(
+        fields: Fields::with_files(
             seed,
             curves
                 .iter()
                 .map(|(name, (curve, _))| (name.clone(), curve.clone()))
                 .collect(),
+            files.clone(),
         ),
-        assets: Vec::new(),
+        files,
     };
     let surface = surface::read(&root, seed, &mut making);
     let film = film(&root.table("film"));
     let camera = camera::read(&root, seed);
     let sky = light::sky(&root, &making);
+    let assets = making.files.take();
     let description = Description {
         name: root.text("name").map_or(stem, |name| name.text).to_owned(),
         key: root.count("key").unwrap_or(1),
@@ -59,11 +62,7 @@ pub(super) fn scene(
         camera,
         film,
         surface: surface.surface,
-        assets: making
-            .assets
-            .iter()
-            .map(|(asset, _)| asset.clone())
-            .collect(),
+        assets: assets.iter().map(|(asset, _)| asset.clone()).collect(),
     };
     for name in making.fields.unused_curves() {
         reader.warn(Mistake {
@@ -73,7 +72,6 @@ pub(super) fn scene(
             place: curves[&name].1.clone(),
         });
     }
-    let assets = making.assets;
     let mut description = description;
     description.surface.graph = making.fields.into_graph();
     finish(reader, description, surface.bound_given)
@@ -121,9 +119,8 @@ fn report(reader: &Reader<'_>, problem: Problem) {
 /// What reading the fields of a scene gathers.
 struct Making<'a> {
     reader: &'a Reader<'a>,
-    folder: &'a Path,
     fields: Fields,
-    assets: Assets,
+    files: Rc<Files>,
 }
 
 impl Making<'_> {
@@ -173,29 +170,18 @@ impl Making<'_> {
 
     /// The number of a file among the scene's assets.
     fn asset(&mut self, name: &Text<'_>) -> Option<u32> {
-        let known = self
-            .assets
-            .iter()
-            .position(|(asset, _)| asset.name == name.text);
-        let index = match known {
-            Some(index) => index,
-            None => match assets::read_asset(self.folder, name.text) {
-                Ok(asset) => {
-                    self.assets.push(asset);
-                    self.assets.len() - 1
-                }
-                Err(message) => {
-                    self.reader.add(Mistake {
-                        message,
-                        label: "this file".into(),
-                        help: Some("paths are relative to the scene file".into()),
-                        place: name.place.clone(),
-                    });
-                    return None;
-                }
-            },
-        };
-        u32::try_from(index).ok()
+        match self.files.get(name.text) {
+            Ok((number, _)) => Some(number),
+            Err(message) => {
+                self.reader.add(Mistake {
+                    message,
+                    label: "this file".into(),
+                    help: Some("paths are relative to the scene file".into()),
+                    place: name.place.clone(),
+                });
+                None
+            }
+        }
     }
 }
 

@@ -738,6 +738,47 @@ fn assets_are_read_by_content_and_confined() {
 }
 
 #[test]
+fn height_maps_are_read_once_and_travel_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("scene.toml");
+    let field = "seed - heightmap(\"h.grid\", base, #{spacing: 10, high: 4}) - noise(base) \
+                 - heightmap(\"h.grid\", base, #{edges: \"repeat\"})";
+    fs::write(
+        &path,
+        GOOD.replace("seed - 20 - rise - 3*noise(base/30)", field),
+    )
+    .unwrap();
+    let said = |path: &Path| load(path, &Overrides::default()).unwrap_err().to_string();
+    assert!(
+        said(&path).contains("cannot open `h.grid`"),
+        "{}",
+        said(&path)
+    );
+    // The place is that of the call, in its line.
+    assert!(said(&path).contains("scene.toml:28:"), "{}", said(&path));
+    fs::write(folder.path().join("h.grid"), b"no grid").unwrap();
+    assert!(
+        said(&path).contains("`h.grid` is no grid"),
+        "{}",
+        said(&path)
+    );
+    let mut grid = b"flyby-grid 1\n5 4\n".to_vec();
+    grid.extend([1.0f32; 20].map(f32::to_le_bytes).concat());
+    fs::write(folder.path().join("h.grid"), &grid).unwrap();
+    let loaded = load(&path, &Overrides::default()).unwrap();
+    assert_eq!(loaded.assets.len(), 1);
+    assert_eq!(loaded.description.surface.graph.files_needed(), [0]);
+    assert!(loaded.description.surface.graph.files().contains_key(&0));
+    let bytes = loaded.description.to_bytes().unwrap();
+    let read = Description::from_bytes(&bytes).unwrap();
+    assert_eq!(read, loaded.description);
+    // A scene that names no such file is refused, whoever sends it.
+    let mut robbed = loaded.description;
+    robbed.assets.clear();
+    assert!(robbed.to_bytes().is_err());
+}
+
+#[test]
 fn files_that_are_no_scenes_say_so() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("scene.toml");
@@ -756,9 +797,12 @@ fn files_that_are_no_scenes_say_so() {
 fn scenes_in_the_repository_load() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let mut count = 0;
-    for entry in fs::read_dir(folder).unwrap() {
+    let entries = fs::read_dir(&folder).unwrap();
+    let figures = fs::read_dir(folder.join("figures")).unwrap();
+    for entry in entries.chain(figures) {
         let path = entry.unwrap().path();
-        if path.extension().is_some_and(|ending| ending == "toml") {
+        let list = path.ends_with("gallery.toml");
+        if path.extension().is_some_and(|ending| ending == "toml") && !list {
             let loaded =
                 load(&path, &Overrides::default()).unwrap_or_else(|error| panic!("{error}"));
             assert_eq!(loaded.warnings, [], "{}", path.display());

@@ -40,6 +40,13 @@ pub(super) fn check(surface: &Surface, assets: usize, found: &mut Problems) {
         }
     }
     material(&surface.material, &surface.graph, assets, found);
+    let files = surface.graph.files_needed();
+    if files.iter().any(|file| *file as usize >= assets) {
+        found.add(
+            "surface.field",
+            "a grid refers to a file that the scene does not name",
+        );
+    }
 }
 
 fn material(material: &Material, graph: &Graph, assets: usize, found: &mut Problems) {
