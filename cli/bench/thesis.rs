@@ -23,7 +23,7 @@ pub(crate) struct Row {
     pub(crate) expression: &'static str,
     /// How its values are normalised, where the thesis leaves it open.
     pub(crate) normalisation: &'static str,
-    /// No value of it is farther from 0, by the range that bounds the rays.
+    /// How far from 0 its values are taken to be where rays are clipped: no root is looked for beyond.
     pub(crate) reach: f64,
     /// λ_N of table 5.1.
     pub(crate) lipschitz_thesis: f64,
@@ -56,8 +56,8 @@ pub(crate) const ROWS: [Row; 3] = [
     Row {
         noise: "sparse convolution",
         expression: "sparse(q, #{nodes: 2})",
-        normalisation: "this program's, K = 2",
-        reach: 2.0,
+        normalisation: "this program's, K = 2; values beyond 4 would be cut off",
+        reach: 4.0,
         lipschitz_thesis: 2.0,
         lipschitz_true: None,
         steps: [77.71, 54.27, 0.71],
