@@ -3,7 +3,8 @@
 //! The thesis gives the field (5.11), 800×800 pixels and η; not its camera, its bounds, its ε or which rays it averages over.
 //! Here: parallel rays along +y, 3.2 m from edge to edge (`scenes/sphere-noise.toml`); each ray between its ends on
 //! the sphere that no value of the field's noises reaches beyond; averages over the rays that meet that sphere.
-//! So ratios can be compared, and counts with their sensitivity to ε in mind.
+//! ε is 10⁻⁷ m unless told otherwise: with it and λ_N = 2.75, sphere tracing takes 79.4 steps against the thesis's 78.19, and
+//! the speculative one takes 0.80 back against 0.78. So ratios can be compared, and counts with their sensitivity to ε in mind.
 
 /// Width of the image plane, metres.
 pub(crate) const WIDTH: f64 = 3.2;

@@ -25,7 +25,7 @@ pub(crate) struct Options {
     side: u32,
 
     /// ε in metres: steps and intervals below it end a search. The thesis does not say its own.
-    #[arg(long, value_name = "METRES", default_value = "1e-6", value_parser = epsilon)]
+    #[arg(long, value_name = "METRES", default_value = "1e-7", value_parser = epsilon)]
     epsilon: f64,
 }
 
@@ -119,7 +119,7 @@ fn measured(row: &Row, program: &Program, options: &Options) -> Measured {
         .map(|method| run(method, None, epsilon))
         .collect();
     let mut sensitivity = Vec::new();
-    for epsilon in [1e-2, 1e-3, 1e-4, 1e-5, 1e-6] {
+    for epsilon in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
         sensitivity.push(speculative(row.lipschitz_thesis, epsilon));
         sensitivity.push(run(&Optimised { epsilon, hit }, None, epsilon));
     }

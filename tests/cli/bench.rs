@@ -7,7 +7,7 @@ use crate::place::Place;
 #[test]
 fn the_thesis_s_tables_are_printed_with_its_numbers() {
     let place = Place::new();
-    let args = ["bench", "thesis", "--side", "8", "--epsilon", "1e-4"];
+    let args = ["bench", "thesis", "--side", "8", "--epsilon", "1e-6"];
     let (text, _) = place.ends(0, &args);
     for word in [
         "Table 5.1",
