@@ -196,6 +196,9 @@ ops! {
     Distances = 132 "distances" (Vector) Params::List => Scalar;
     /// A convolution surface, thesis eq. (2.11), of the same constants.
     Convolution = 133 "convolution" (Vector) Params::List => Scalar;
+    /// A trivariate Bernstein polynomial, of which free-form deformations are made: three degrees, the box's least
+    /// and greatest corner, control values with x fastest. Beyond the box it goes on as on its faces.
+    Bernstein = 134 "bernstein" (Vector) Params::List => Scalar;
 
     /// The samples of file number `asset` at a place counted in samples: [`crate::grid`].
     Grid = 192 "grid" (Vector) Params::Named(&["asset", "edges", "degree"]) => Scalar;

@@ -245,6 +245,7 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::Blobs
         | Op::Distances
         | Op::Convolution
+        | Op::Bernstein
         | Op::Blend => unreachable!("functions of numbers and shapes are taken above"),
         Op::Grid | Op::SpectralTerrain | Op::Sea | Op::MidpointTerrain => {
             unreachable!("grids have surfaces")

@@ -4,6 +4,7 @@
 //! surfaces) with its list of constants. Each is written once, over [`Local`] numbers, and states
 //! its range and its slope over a region. What the constants mean is said where the shape is made.
 
+mod bernstein;
 mod blend;
 mod blobs;
 mod convolution;
@@ -24,6 +25,7 @@ pub(crate) mod tests;
 use crate::interval::{Interval, larger};
 use crate::op::Op;
 use crate::range::Arithmetic;
+use bernstein::Bernstein;
 use blend::Blend;
 use blobs::Blobs;
 use convolution::Convolution;
@@ -44,6 +46,7 @@ pub(crate) enum Shape {
     Blobs(Blobs),
     Distances(Distances),
     Convolution(Convolution),
+    Bernstein(Bernstein),
     Blend(Blend),
 }
 
@@ -56,6 +59,7 @@ impl Shape {
             Op::Blobs => Blobs::new(params).map(Self::Blobs),
             Op::Distances => Distances::new(params).map(Self::Distances),
             Op::Convolution => Convolution::new(params).map(Self::Convolution),
+            Op::Bernstein => Bernstein::new(params).map(Self::Bernstein),
             Op::Blend => Blend::new(params).map(Self::Blend),
             _ => return None,
         })
@@ -70,6 +74,7 @@ impl Shape {
             Self::Blobs(shape) => shape.value(at),
             Self::Distances(shape) => shape.value(at),
             Self::Convolution(shape) => shape.value(at),
+            Self::Bernstein(shape) => shape.value(at),
             Self::Blend(shape) => {
                 let [a, b, _] = at;
                 shape.value(a, b)
@@ -85,6 +90,7 @@ impl Shape {
             Self::Blobs(shape) => shape.bound(within),
             Self::Distances(shape) => shape.bound(within),
             Self::Convolution(shape) => shape.bound(within),
+            Self::Bernstein(shape) => shape.bound(within),
             Self::Blend(shape) => {
                 let [a, b, _] = within.parts;
                 Known {

@@ -118,6 +118,17 @@ pub(crate) fn zoo() -> Vec<(String, Graph, NodeId)> {
             add(&format!("blobs {kernel} far {far}"), Op::Blobs, &params);
         }
     }
+    add(
+        "bernstein",
+        Op::Bernstein,
+        &[
+            &[2.0, 1.0, 3.0, -1.5, -2.0, -1.0, 1.5, 2.0, 2.0][..],
+            &(0..24)
+                .map(|i| unit(hash(&[i, 5])) - 0.5)
+                .collect::<Vec<_>>(),
+        ]
+        .concat(),
+    );
     for (name, kernel, list) in skeletons() {
         for far in [0.0, 1.0] {
             let mut params = vec![kernel, 0.6, far];
@@ -358,6 +369,38 @@ fn distances_are_those_of_the_nearest_point() {
                 "{kind} at {p:?}: {value} {near} {short}"
             );
         }
+    }
+}
+
+#[test]
+fn control_values_along_a_line_give_that_line() {
+    // Bernstein polynomials of any degree reproduce linear functions: here x + 2y − z over a box.
+    let (min, max) = ([-1.0, 0.0, 2.0], [2.0, 1.0, 4.0]);
+    let mut params = vec![3.0, 1.0, 2.0];
+    params.extend(min);
+    params.extend(max);
+    let at = |k: usize, share: f64| min[k] + (max[k] - min[k]) * share;
+    for k in 0..3 {
+        for j in 0..2 {
+            for i in 0..4 {
+                let (i, j, k) = (f64::from(i) / 3.0, f64::from(j), f64::from(k) / 2.0);
+                params.push(at(0, i) + 2.0 * at(1, j) - at(2, k));
+            }
+        }
+    }
+    let places = [
+        [0.3, 0.2, 3.1],
+        [-1.0, 1.0, 2.0],
+        [1.7, 0.9, 2.2],
+        [9.0, 0.5, 3.0],
+    ];
+    let seen = values(Op::Bernstein, &params, &places);
+    for (p, value) in places.iter().zip(seen) {
+        let x = p[0].min(2.0);
+        assert!(
+            (value - (x + 2.0 * p[1] - p[2])).abs() < 1e-14,
+            "{p:?}: {value}"
+        );
     }
 }
 

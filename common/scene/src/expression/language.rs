@@ -62,6 +62,7 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "morph",
     "twist",
     "taper",
+    "free_form",
 ];
 
 /// Symbols that are refused while parsing; [`refusal`] says what to use instead.

@@ -277,6 +277,9 @@ fn usage(name: &str) -> String {
         "blend" => "blend(a, b, width)",
         "morph" => "morph(a, b, u)",
         "twist" => "twist(p, radians per metre)",
+        "free_form" => {
+            "free_form(p, [[dx, dy, dz], ...], #{min: [-1, -1, -1], max: [1, 1, 1], counts: [2, 2, 2]})"
+        }
         "taper" => "taper(p, #{low: -1, high: 1, scale: [1, 0.5]})",
         "length" | "onto_plane" => return format!("it is used like {name}(p)"),
         other => return format!("it is used like {other}(x)"),

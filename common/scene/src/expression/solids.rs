@@ -9,7 +9,7 @@ use field::{NodeId, Op};
 use rhai::{Array, Dynamic, Engine, Map};
 
 use super::Shared;
-use super::options::Options;
+use super::options::{self, Options};
 use super::values::{Made, Operand, Scalar, refuse};
 
 /// A boolean operation on solids.
@@ -64,6 +64,10 @@ pub(super) fn register(engine: &mut Engine, shared: &Rc<Shared>) {
     let s = shared.clone();
     engine.register_fn("twist", move |at: Dynamic, rate: Dynamic| {
         s.twist(&at, &rate)
+    });
+    let s = shared.clone();
+    engine.register_fn("free_form", move |at: Dynamic, moves: Array, given: Map| {
+        s.free_form(&at, &moves, &given)
     });
     let s = shared.clone();
     engine.register_fn("taper", move |at: Dynamic, given: Map| s.taper(&at, &given));
@@ -182,6 +186,30 @@ impl Shared {
             self.push(Op::Div, &[y, scale], &[])?,
         );
         Ok(Operand::Vector(self.push(Op::Vector, &[u, v, z], &[])?).into_dynamic())
+    }
+
+    /// Moves the place by a free-form deformation (Sederberg and Parry 1986): a lattice of displacements over a
+    /// box, x fastest, joined by Bernstein polynomials. Beyond the box they go on as on its faces.
+    fn free_form(&self, at: &Dynamic, moves: &Array, given: &Map) -> Made<Dynamic> {
+        let name = "free_form";
+        let at = Self::vector(name, at)?;
+        let options = Options::new(name, &["min", "max", "counts"], given)?;
+        let counts = options.numbers("counts", [2.0; 3])?;
+        let mut params = counts.map(|count| count - 1.0).to_vec();
+        params.extend(options.numbers("min", [-1.0; 3])?);
+        params.extend(options.numbers("max", [1.0; 3])?);
+        let moves = moves
+            .iter()
+            .map(|each| options::place(name, each))
+            .collect::<Made<Vec<_>>>()?;
+        let mut parts = [at; 3];
+        for (axis, part) in parts.iter_mut().enumerate() {
+            let mut params = params.clone();
+            params.extend(moves.iter().map(|each| each[axis]));
+            *part = self.push(Op::Bernstein, &[at], &params)?;
+        }
+        let way = self.push(Op::Vector, &parts, &[])?;
+        Ok(Operand::Vector(self.push(Op::VectorAdd, &[at, way], &[])?).into_dynamic())
     }
 
     /// The components of a vector.

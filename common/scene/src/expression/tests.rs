@@ -174,6 +174,10 @@ fn shapes_take_places_lists_and_options() {
             "convolution(p/2, [#{arc: [[0, 0, 0], [1, 0, 0], [0, 0, 1]], angle: PI}], #{kernel: \"cauchy\"})",
             "convolution((p*0.5))",
         ),
+        (
+            "free_form(p, [[0,0,0],[1,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0],[0,0,0]], #{max: [2, 2, 2]}).x",
+            "(p + vec(bernstein(p), bernstein(p), bernstein(p))).x",
+        ),
         ("union(p.x, p.y)", "min(p.x, p.y)"),
         ("intersection([p.x, p.y, p.z])", "max(max(p.x, p.y), p.z)"),
         (
@@ -243,6 +247,10 @@ fn shapes_take_places_lists_and_options() {
         (
             "distances([[0, 0, 0]])",
             "`distances` wants maps that each hold a primitive",
+        ),
+        (
+            "length(free_form(p, [[0, 0, 0]], #{counts: [2, 2, 3]}))",
+            "`bernstein` wants one control value for each point of its lattice, not 1",
         ),
         (
             "union(p.x, p.y, #{width: 1, sharpness: 2})",
