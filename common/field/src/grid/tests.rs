@@ -111,7 +111,7 @@ fn boxes_hold_values_and_slopes() {
             let over = low.map(|low| Interval::new(low, low + size));
             let (range, slopes) = surface.over(over);
             for j in 0..20 {
-                let at = [0, 1, 2].map(|k| low[k] + size * unit(hash(&[key, i, j, k as u32])));
+                let at = [0u32, 1, 2].map(|k| low[k as usize] + size * unit(hash(&[key, i, j, k])));
                 let (value, gradient) = surface.value_gradient(at);
                 assert!(
                     range.contains(value),
