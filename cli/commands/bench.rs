@@ -1,5 +1,7 @@
 //! `flyby bench`: measurements beside those of the reference documents.
 
+mod peers;
+
 use clap::{Args, Subcommand};
 use field::{Interval, Program};
 use render::methods::{Hit, Method, Mitchell, Optimised, Speculative, SphereTracing, Subdivision};
@@ -15,6 +17,8 @@ use crate::output;
 pub(crate) enum BenchCommand {
     /// Evaluations per ray of the methods of thesis chapter 5, beside its tables 5.1 to 5.5.
     Thesis(Options),
+    /// Times of one thread beside other programs' on the same surfaces, in turns.
+    Peers(peers::Options),
 }
 
 #[derive(Args, Debug)]
@@ -39,9 +43,13 @@ fn epsilon(text: &str) -> Result<f64, String> {
 
 /// Runs the command.
 pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Error> {
-    let BenchCommand::Thesis(options) = command;
-    output::print(context.output, &tables(&options))?;
-    Ok(Ending::Done)
+    match command {
+        BenchCommand::Thesis(options) => {
+            output::print(context.output, &tables(&options))?;
+            Ok(Ending::Done)
+        }
+        BenchCommand::Peers(options) => peers::run(context, &options),
+    }
 }
 
 fn tables(options: &Options) -> Tables {
