@@ -10,6 +10,7 @@ mod daemon;
 mod error;
 mod existing;
 mod farm;
+mod gallery;
 mod load;
 mod movie;
 mod noise;

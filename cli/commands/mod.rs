@@ -4,6 +4,7 @@ mod bench;
 mod completions;
 mod coordinator;
 mod demo;
+mod gallery;
 mod image;
 mod job;
 mod noise;
@@ -79,7 +80,9 @@ enum Command {
     /// Noises: the statistics by which they are judged, as tables and plots.
     #[command(subcommand)]
     Noise(noise::NoiseCommand),
-    /// Measurements beside those of the reference documents.
+    /// Renders the figures of the thesis into one page with captions and times.
+    Gallery(gallery::Gallery),
+    /// Measurements beside those of others.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
     /// Prints a completion script for a shell.
@@ -104,6 +107,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),
         Command::Noise(command) => noise::run(&context, command),
+        Command::Gallery(options) => gallery::run(&context, &options),
         Command::Bench(command) => bench::run(&context, command),
         Command::Completions(options) => completions::completions(&options, Cli::command()),
         Command::Man(options) => completions::man(&options, Cli::command()),

@@ -2,8 +2,7 @@
 
 use crate::place::Place;
 
-const COMMANDS: [&str; 10] = [
-    "bench",
+const COMMANDS: [&str; 11] = [
     "demo",
     "render",
     "coordinator",
@@ -13,6 +12,8 @@ const COMMANDS: [&str; 10] = [
     "scene",
     "image",
     "noise",
+    "gallery",
+    "bench",
 ];
 
 #[test]

@@ -8,6 +8,7 @@
 )]
 
 mod bench;
+mod gallery;
 mod help;
 mod image;
 mod noise;
