@@ -35,6 +35,8 @@ fn noise(criterion: &mut Criterion) {
     };
     let mut scratch = Scratch::new();
     let mut out = vec![0.0; POINTS];
+    let direction = [0.6, 0.8, 0.0].map(|part| vec![part; POINTS]);
+    let mut slope = vec![0.0; POINTS];
     let mut gradient = [(); 3].map(|()| vec![0.0; POINTS]);
     let programs = [
         ("noise", program(Op::Noise, &[1.0])),
@@ -62,6 +64,13 @@ fn noise(criterion: &mut Criterion) {
                 let [gx, gy, gz] = &mut gradient;
                 bencher.iter(|| {
                     program.evaluate_gradient(level, &points, &mut scratch, &mut out, [gx, gy, gz])
+                });
+            });
+            let [gx, gy, gz] = &direction;
+            group.bench_function(BenchmarkId::new("along", level), |bencher| {
+                bencher.iter(|| {
+                    let out = [&mut out[..], &mut slope];
+                    program.evaluate_along(level, &points, [gx, gy, gz], &mut scratch, out)
                 });
             });
         }

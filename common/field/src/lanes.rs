@@ -117,14 +117,13 @@ pub(crate) fn values_gradients<S: Simd>(
     lattice: Lattice,
     cells: &mut Cells,
     out: &mut [f32; BATCH],
-    gradient: &mut [[f32; BATCH]; 3],
+    [gx, gy, gz]: [&mut [f32; BATCH]; 3],
 ) {
     simd.vectorize(
         #[inline(always)]
         || {
             assert!(n <= BATCH);
             cells.hash(n, lattice);
-            let [gx, gy, gz] = gradient;
             for i in 0..n {
                 [gx[i], gy[i], gz[i]] =
                     noise::mean_gradient(cells.corners_at(i), cells.offset_at(i));
@@ -135,6 +134,29 @@ pub(crate) fn values_gradients<S: Simd>(
                 gx[i] += x;
                 gy[i] += y;
                 gz[i] += z;
+            }
+        },
+    );
+}
+
+/// The noise of every cell and offset, and its derivative along a direction of each lane's own.
+pub(crate) fn values_along<S: Simd>(
+    simd: S,
+    n: usize,
+    lattice: Lattice,
+    cells: &mut Cells,
+    [p, q, r]: &[[f32; BATCH]; 3],
+    out: &mut [f32; BATCH],
+    slope: &mut [f32; BATCH],
+) {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            assert!(n <= BATCH);
+            cells.hash(n, lattice);
+            for i in 0..n {
+                (out[i], slope[i]) =
+                    noise::value_along(cells.corners_at(i), cells.offset_at(i), [p[i], q[i], r[i]]);
             }
         },
     );

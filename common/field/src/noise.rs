@@ -19,6 +19,10 @@ pub const RANGE: f64 = 1.037;
 /// centre. The thesis's 2.75 (§5.2.3) is not one.
 pub const SLOPE: f64 = 3.75;
 
+/// No second derivative along a unit direction is greater or less: the supremum is 14.4652, between
+/// eight gradients chosen for it, at (0.5, 0.399, 0.601) along (0.569, −0.582, −0.582).
+pub const BEND: f64 = 14.48;
+
 /// No value is farther from the exact one at its f32 offset.
 ///
 /// With u = 2⁻²⁴: a kernel's product is good to 2u and the fade to 3.3u (every f32 in [0, 1] was tried).
@@ -185,6 +189,48 @@ pub(crate) fn value_bend(h: [u32; 8], [x, y, z]: [f32; 3]) -> (f32, [f32; 3]) {
     (lerp(w, near, far), bend)
 }
 
+/// The noise as [`value`] gives it, to the bit, and its derivative along `e`.
+///
+/// A kernel is a product of a corner's gradient with the way to it, so its derivative along `e` is
+/// the kernel of `e` itself.
+#[inline(always)]
+pub(crate) fn value_along(h: [u32; 8], [x, y, z]: [f32; 3], [p, q, r]: [f32; 3]) -> (f32, f32) {
+    let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
+    let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
+    let (a0, a1) = (kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
+    let (b0, b1) = (kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
+    let (c0, c1) = (kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
+    let (d0, d1) = (kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
+    let (a, b, c, d) = (
+        lerp(u, a0, a1),
+        lerp(u, b0, b1),
+        lerp(u, c0, c1),
+        lerp(u, d0, d1),
+    );
+    let (near, far) = (lerp(v, a, b), lerp(v, c, d));
+    let us = fade_slope(x, x1) * p;
+    let (vs, ws) = (fade_slope(y, y1) * q, fade_slope(z, z1) * r);
+    let e = [p, q, r];
+    let (sa, sb) = (
+        edge(u, us, e, [h[0], h[1]], a1 - a0),
+        edge(u, us, e, [h[2], h[3]], b1 - b0),
+    );
+    let (sc, sd) = (
+        edge(u, us, e, [h[4], h[5]], c1 - c0),
+        edge(u, us, e, [h[6], h[7]], d1 - d0),
+    );
+    let near_slope = lerp(v, sa, sb) + vs * (b - a);
+    let far_slope = lerp(v, sc, sd) + vs * (d - c);
+    let slope = lerp(w, near_slope, far_slope) + ws * (far - near);
+    (lerp(w, near, far), slope)
+}
+
+/// The derivative along `e` of two corners' kernels, joined by the fade `u` of slope `us`.
+#[inline(always)]
+fn edge(u: f32, us: f32, [p, q, r]: [f32; 3], h: [u32; 2], apart: f32) -> f32 {
+    lerp(u, kernel(h[0], p, q, r), kernel(h[1], p, q, r)) + us * apart
+}
+
 /// The first part of the noise's gradient: the corners' own gradients, weighted.
 #[inline(always)]
 pub(crate) fn mean_gradient(h: [u32; 8], [x, y, z]: [f32; 3]) -> [f32; 3] {
@@ -265,51 +311,63 @@ mod tests {
         assert!(mean.abs() < 3e-3, "{mean}");
     }
 
-    /// h and h′.
-    fn profile(t: f64) -> (f64, f64) {
+    /// h, h′ and h″.
+    fn profile(t: f64) -> (f64, f64, f64) {
         let a = t.abs();
         let slope = -30.0 * (a * (1.0 - a)) * (a * (1.0 - a));
         (
             1.0 - a * a * a * (a * (6.0 * a - 15.0) + 10.0),
             slope.copysign(-t),
+            -60.0 * a * (1.0 - a) * (1.0 - 2.0 * a),
         )
     }
 
-    /// The highest value at an offset, and the steepest slope along a direction, that any choice of gradients gives.
-    fn suprema(t: [f64; 3], along: [f64; 3]) -> (f64, f64) {
+    /// The highest value at an offset, and the steepest slope and the greatest second derivative along a
+    /// direction, that any choice of gradients gives.
+    fn suprema(t: [f64; 3], along: [f64; 3]) -> [f64; 3] {
         // The best of the twelve gradients adds up the two largest components of what it is multiplied with.
         let best = |mut v: [f64; 3]| {
             v = v.map(f64::abs);
             v.sort_by(f64::total_cmp);
             v[1] + v[2]
         };
-        let (mut highest, mut steepest) = (0.0, 0.0);
+        let [p, q, r] = along;
+        let mut most = [0.0; 3];
         for corner in 0..8 {
             let d = [0, 1, 2].map(|k| t[k] - f64::from((corner >> k) & 1));
-            let [(hx, sx), (hy, sy), (hz, sz)] = d.map(profile);
+            let [(hx, sx, bx), (hy, sy, by), (hz, sz, bz)] = d.map(profile);
             let weight = hx * hy * hz;
-            let slope = sx * hy * hz * along[0] + hx * sy * hz * along[1] + hx * hy * sz * along[2];
-            highest += weight * best(d);
-            steepest += best([0, 1, 2].map(|k| weight * along[k] + slope * d[k]));
+            let slope = sx * hy * hz * p + hx * sy * hz * q + hx * hy * sz * r;
+            let bend = bx * hy * hz * p * p
+                + hx * by * hz * q * q
+                + hx * hy * bz * r * r
+                + 2.0 * (sx * sy * hz * p * q + sx * hy * sz * p * r + hx * sy * sz * q * r);
+            most[0] += weight * best(d);
+            most[1] += best([0, 1, 2].map(|k| weight * along[k] + slope * d[k]));
+            most[2] += best([0, 1, 2].map(|k| 2.0 * slope * along[k] + bend * d[k]));
         }
-        (highest, steepest)
+        most
     }
 
     #[test]
     fn no_choice_of_gradients_exceeds_the_bounds() {
-        let (mut highest, mut steepest) = (0.0f64, 0.0f64);
+        let mut most = [0.0f64; 3];
         for i in 0..300_000 {
             let part = |k: u32| unit(hash(&[i, k]));
             let along = [3, 4, 5].map(|k| part(k) - 0.5);
             let length = (along[0] * along[0] + along[1] * along[1] + along[2] * along[2]).sqrt();
-            let (high, steep) = suprema([part(0), part(1), part(2)], along.map(|a| a / length));
-            highest = highest.max(high);
-            steepest = steepest.max(steep);
+            let here = suprema([part(0), part(1), part(2)], along.map(|a| a / length));
+            most = [0, 1, 2].map(|k| most[k].max(here[k]));
         }
+        let [highest, steepest, bent] = most;
         assert!(highest > 1.03 && highest < RANGE - 5e-4, "{highest}");
         assert!(steepest > 3.5 && steepest <= SLOPE, "{steepest}");
-        let centre = suprema([0.5; 3], [1.0, 0.0, 0.0]).1;
+        assert!(bent > 13.9 && bent <= BEND, "{bent}");
+        let [_, centre, _] = suprema([0.5; 3], [1.0, 0.0, 0.0]);
         assert!((centre - SLOPE).abs() < 1e-12, "{centre}");
+        let corner = [0.568_708_58, -0.581_622_96, -0.581_622_97];
+        let [.., bent] = suprema([0.5, 0.399_191_96, 0.600_803_68], corner);
+        assert!(bent > 14.465_14 && bent < BEND, "{bent}");
     }
 
     #[test]

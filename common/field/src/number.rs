@@ -137,32 +137,32 @@ impl Number for f64 {
     }
 }
 
-/// A value and its gradient by three coordinates, thesis eq. (2.17).
+/// A value and its derivatives by `N` variables: the three coordinates, thesis eq. (2.17), or the way along a ray.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub(crate) struct Dual {
+pub(crate) struct Dual<const N: usize = 3> {
     pub(crate) value: f64,
-    pub(crate) gradient: [f64; 3],
+    pub(crate) gradient: [f64; N],
 }
 
-impl Dual {
+impl<const N: usize> Dual<N> {
     /// A function's value, its derivative applied to this gradient.
     #[inline(always)]
     pub(crate) fn chain(self, value: f64, slope: f64) -> Self {
-        let [x, y, z] = self.gradient;
-        Self {
-            value,
-            gradient: [x * slope, y * slope, z * slope],
+        let mut gradient = self.gradient;
+        for part in &mut gradient {
+            *part *= slope;
         }
+        Self { value, gradient }
     }
 
     /// A value whose gradient is s·self + t·other.
     #[inline(always)]
     pub(crate) fn chain2(self, other: Self, value: f64, (s, t): (f64, f64)) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.gradient, other.gradient);
-        Self {
-            value,
-            gradient: [a * s + x * t, b * s + y * t, c * s + z * t],
+        let mut gradient = self.gradient;
+        for (part, other) in gradient.iter_mut().zip(other.gradient) {
+            *part = *part * s + other * t;
         }
+        Self { value, gradient }
     }
 
     #[inline(always)]
@@ -173,30 +173,36 @@ impl Dual {
     }
 }
 
-impl Number for Dual {
+impl<const N: usize> Number for Dual<N> {
     #[inline(always)]
     fn constant(value: f64) -> Self {
         Self {
             value,
-            gradient: [0.0; 3],
+            gradient: [0.0; N],
         }
     }
 
     #[inline(always)]
     fn plus(self, other: Self) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.gradient, other.gradient);
+        let mut gradient = self.gradient;
+        for (part, other) in gradient.iter_mut().zip(other.gradient) {
+            *part += other;
+        }
         Self {
             value: self.value + other.value,
-            gradient: [a + x, b + y, c + z],
+            gradient,
         }
     }
 
     #[inline(always)]
     fn minus(self, other: Self) -> Self {
-        let ([a, b, c], [x, y, z]) = (self.gradient, other.gradient);
+        let mut gradient = self.gradient;
+        for (part, other) in gradient.iter_mut().zip(other.gradient) {
+            *part -= other;
+        }
         Self {
             value: self.value - other.value,
-            gradient: [a - x, b - y, c - z],
+            gradient,
         }
     }
 
@@ -253,10 +259,13 @@ impl Number for Dual {
 
     #[inline(always)]
     fn gate(self, live: bool) -> Self {
-        let [x, y, z] = self.gradient;
+        let mut gradient = self.gradient;
+        for part in &mut gradient {
+            *part = part.gate(live);
+        }
         Self {
             value: self.value.gate(live),
-            gradient: [x.gate(live), y.gate(live), z.gate(live)],
+            gradient,
         }
     }
 }

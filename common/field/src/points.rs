@@ -48,7 +48,8 @@ pub struct Scratch {
     /// Noises evaluated so far, see [`crate::Program::noise_evaluations`].
     pub noise_evaluations: u64,
     pub(crate) machine: Machine,
-    pub(crate) slopes: Slopes,
+    pub(crate) slopes: Slopes<3>,
+    pub(crate) along: Slopes<1>,
 }
 
 impl Scratch {

@@ -2,7 +2,9 @@
 
 use crate::hash::{hash, unit};
 use crate::program::tests::{fig_5_6, planet, scaled, values, zoo};
-use crate::{Graph, Interval, NodeId, Op, Points, Program, Region, SimdLevel, Surroundings};
+use crate::{
+    Graph, Interval, NodeId, Op, Points, Program, Region, Scratch, SimdLevel, Surroundings,
+};
 
 /// Pairs of places in a region: near and far, with the footprints of a camera at `eye`.
 struct Pairs {
@@ -118,7 +120,61 @@ impl Pairs {
                 (change - modulus.levels.first().map_or(0.0, |level| level.offset)) / distance,
             );
         }
+        self.check_taylor(name, program, &f, &g);
         steepest / modulus.lipschitz()
+    }
+
+    /// Checks the tangent bound from the first place of every pair to the second.
+    fn check_taylor(&self, name: &str, program: &Program, f: &[f64], g: &[f64]) {
+        let Some(taylor) = program.taylor(&self.around) else {
+            return;
+        };
+        let n = f.len();
+        let part = |end: usize, k: usize, i: usize| self.columns[end][k][i];
+        let way = |i: usize| [0, 1, 2].map(|k| part(1, k, i) - part(0, k, i));
+        let distance = |i: usize| {
+            let [x, y, z] = way(i);
+            (x * x + y * y + z * z).sqrt()
+        };
+        let direction = [0, 1, 2].map(|k| {
+            (0..n)
+                .map(|i| way(i)[k] / distance(i).max(1e-300))
+                .collect::<Vec<_>>()
+        });
+        let [dx, dy, dz] = &direction;
+        let (mut value, mut slope) = (vec![0.0; n], vec![0.0; n]);
+        program.evaluate_along(
+            SimdLevel::best(),
+            &self.points(0),
+            [dx, dy, dz],
+            &mut Scratch::new(),
+            [&mut value, &mut slope],
+        );
+        assert!(
+            f.iter()
+                .zip(&value)
+                .all(|(f, v)| f.to_bits() == v.to_bits())
+        );
+        for i in 0..n {
+            let s = distance(i);
+            let within = (1..16).all(|step| {
+                let share = f64::from(step) / 16.0;
+                inside(
+                    self.around.region,
+                    [0, 1, 2].map(|k| part(0, k, i) + share * way(i)[k]),
+                )
+            });
+            let least = value[i] + (slope[i] - taylor.slope) * s
+                - taylor.offset
+                - 0.5 * taylor.curvature * s * s;
+            assert!(
+                !within || g[i] >= least,
+                "{name}: {} after {s} is below {least}: {} {} {taylor:?}",
+                g[i],
+                value[i],
+                slope[i]
+            );
+        }
     }
 }
 
@@ -200,6 +256,10 @@ fn the_bound_of_the_spheres_is_the_derived_one() {
     let modulus = program.modulus(&around);
     assert!((modulus.lipschitz() - 13.0).abs() < 1e-6);
     assert!(modulus.levels[0].offset < 1e-5);
+    // 1/0.3 · the distance bends up only; (0.3·16 + 0.15·64 + 0.05·256) · 14.48 = 393.9.
+    let taylor = program.taylor(&around).unwrap();
+    assert!((taylor.curvature - 393.856).abs() < 1e-3, "{taylor:?}");
+    assert!(taylor.slope < 2e-3 && taylor.offset < 2e-5, "{taylor:?}");
     // Far away only the distance itself counts as slope: the noises are at most 1.037.
     let far = modulus.levels[modulus.levels.len() - 2];
     assert!(

@@ -41,7 +41,7 @@ pub(crate) struct Change {
 }
 
 impl Change {
-    const NONE: Self = Self {
+    pub(crate) const NONE: Self = Self {
         offset: 0.0,
         slope: 0.0,
     };
@@ -146,6 +146,10 @@ impl Bound {
 pub(crate) struct Pass<'a> {
     around: &'a Surroundings,
     radius: f64,
+    /// Whether places change, or only what the footprint does by itself.
+    moving: bool,
+    /// Whether slopes are wanted that bound derivatives, even where a range says more of changes.
+    derivatives: bool,
     /// The radii at which some step's range becomes narrower than its change.
     pub(crate) crossings: Vec<f64>,
 }
@@ -155,7 +159,25 @@ impl<'a> Pass<'a> {
         Self {
             around,
             radius,
+            moving: true,
+            derivatives: false,
             crossings: Vec::new(),
+        }
+    }
+
+    /// A pass whose slopes bound derivatives, wherever second derivatives can be bounded.
+    pub(crate) fn of_derivatives(around: &'a Surroundings) -> Self {
+        Self {
+            derivatives: true,
+            ..Self::new(around, 0.0)
+        }
+    }
+
+    /// A pass over what level-of-detail weights change by themselves, all else standing still.
+    pub(crate) fn of_weights(around: &'a Surroundings) -> Self {
+        Self {
+            moving: false,
+            ..Self::new(around, 0.0)
         }
     }
 
@@ -179,7 +201,7 @@ impl<'a> Pass<'a> {
             Act::ConstantVector(value) => {
                 vector(value.map(Interval::point), Interval::ALL, Change::NONE)
             }
-            Act::Position => position(self.around.region),
+            Act::Position => position(self.around.region, self.moving),
             Act::Time => Bound::Scalar {
                 range: self.around.time,
                 change: Change::NONE,
@@ -275,7 +297,7 @@ impl<'a> Pass<'a> {
 
     fn limited(&mut self, range: Interval, change: Change) -> Change {
         let width = Change::new(range.width(), 0.0);
-        if !width.offset.is_finite() {
+        if self.derivatives || !width.offset.is_finite() {
             return change;
         }
         let crossing = (width.offset - change.offset) / change.slope;
@@ -287,7 +309,8 @@ impl<'a> Pass<'a> {
 
     /// The smaller of two bounds at the radius of interest.
     fn closer(&self, a: Change, b: Change) -> Change {
-        if b.at(self.radius) < a.at(self.radius) {
+        let b_is_no_slope = self.derivatives && a.slope.is_finite();
+        if b.at(self.radius) < a.at(self.radius) && !b_is_no_slope {
             b
         } else {
             a
@@ -536,7 +559,7 @@ impl<'a> Pass<'a> {
     }
 
     /// The level-of-detail weight of octave `i`. It changes with the footprint, where it is neither 0 nor 1.
-    fn weight(&mut self, cascade: &Cascade, i: usize) -> Part {
+    pub(crate) fn weight(&mut self, cascade: &Cascade, i: usize) -> Part {
         let Some(detail) = cascade.detail else {
             return ONE;
         };
@@ -596,7 +619,7 @@ impl<'a> Pass<'a> {
 }
 
 /// All values of the noise; its supremum is further below than it rounds.
-const NOISE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
+pub(crate) const NOISE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
 
 const ONE: Part = Part {
     range: Interval::point(1.0),
@@ -605,8 +628,8 @@ const ONE: Part = Part {
 
 /// A number on its way through a cascade.
 #[derive(Clone, Copy)]
-struct Part {
-    range: Interval,
+pub(crate) struct Part {
+    pub(crate) range: Interval,
     change: Change,
 }
 
@@ -712,7 +735,7 @@ fn joined(step: &Step, steps: &[Step], bounds: &[Bound]) -> Change {
     Change::norm(&changes)
 }
 
-fn position(region: Region) -> Bound {
+fn position(region: Region, moving: bool) -> Bound {
     let world = Interval::new(-WORLD, WORLD);
     let held = |range: Interval| range.meet(world);
     let (parts, norm) = match region {
@@ -733,5 +756,9 @@ fn position(region: Region) -> Bound {
             Interval::ALL,
         ),
     };
-    vector(parts, norm, Change::new(0.0, 1.0))
+    vector(
+        parts,
+        norm,
+        Change::new(0.0, if moving { 1.0 } else { 0.0 }),
+    )
 }

@@ -1,12 +1,14 @@
 //! The machine that evaluates code with gradients, by the chain rule of thesis eq. (2.17).
 //!
-//! Registers hold duals: a value and its gradient by the world's x, y, z. Footprint and time count as constants.
+//! Registers hold duals: a value and its derivatives, either by the world's x, y, z (`N` = 3) or along
+//! one direction of each lane's own (`N` = 1). Footprint and time count as constants.
 
 use fearless_simd::Simd;
 
 use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Octave, Term};
 use crate::lanes::{self, Cells, Lanes};
+use crate::noise::Lattice;
 use crate::number::Dual;
 use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
@@ -14,35 +16,37 @@ use crate::program::machine::{self, Count};
 
 /// Duals, one per lane, as structure of arrays.
 #[derive(Debug)]
-pub(crate) struct Duals {
+pub(crate) struct Duals<const N: usize> {
     pub(crate) value: Lanes,
-    pub(crate) gradient: [Lanes; 3],
+    pub(crate) gradient: [Lanes; N],
 }
 
-impl Duals {
+impl<const N: usize> Duals<N> {
     fn new() -> Box<Self> {
         Box::new(Self {
             value: [0.0; BATCH],
-            gradient: [[0.0; BATCH]; 3],
+            gradient: [[0.0; BATCH]; N],
         })
     }
 
     #[inline(always)]
-    fn at(&self, i: usize) -> Dual {
-        let [x, y, z] = &self.gradient;
+    fn at(&self, i: usize) -> Dual<N> {
+        let mut gradient = [0.0; N];
+        for (part, lanes) in gradient.iter_mut().zip(&self.gradient) {
+            *part = lanes[i];
+        }
         Dual {
             value: self.value[i],
-            gradient: [x[i], y[i], z[i]],
+            gradient,
         }
     }
 
     #[inline(always)]
-    fn set(&mut self, i: usize, dual: Dual) {
-        let ([x, y, z], [a, b, c]) = (&mut self.gradient, dual.gradient);
+    fn set(&mut self, i: usize, dual: Dual<N>) {
         self.value[i] = dual.value;
-        x[i] = a;
-        y[i] = b;
-        z[i] = c;
+        for (lanes, part) in self.gradient.iter_mut().zip(dual.gradient) {
+            lanes[i] = part;
+        }
     }
 
     fn set_constant(&mut self, value: f64) {
@@ -55,27 +59,29 @@ impl Duals {
 
 /// The registers of duals.
 #[derive(Debug)]
-pub(crate) struct Slopes {
-    registers: Vec<Box<Duals>>,
+pub(crate) struct Slopes<const N: usize> {
+    registers: Vec<Box<Duals<N>>>,
     constants: Vec<f64>,
-    result: Box<Duals>,
-    octaves: Box<Octaves>,
+    result: Box<Duals<N>>,
+    octaves: Box<Octaves<N>>,
 }
 
 /// Room for the octaves of one cascade.
 #[derive(Debug)]
-struct Octaves {
+struct Octaves<const N: usize> {
     cells: Cells,
-    sample: Sample,
-    total: Box<Duals>,
-    rest: Box<Duals>,
+    /// Directions in the octave's lattice; of use where `N` is 1.
+    along: [[f32; BATCH]; 3],
+    sample: Sample<N>,
+    total: Box<Duals<N>>,
+    rest: Box<Duals<N>>,
 }
 
 /// One octave's noise over the lanes.
 #[derive(Debug)]
-struct Sample {
+struct Sample<const N: usize> {
     noise: [f32; BATCH],
-    gradient: [[f32; BATCH]; 3],
+    gradient: [[f32; BATCH]; N],
     depth: Lanes,
 }
 
@@ -87,7 +93,7 @@ struct Place<'a> {
     octave: &'a Octave,
 }
 
-impl Default for Slopes {
+impl<const N: usize> Default for Slopes<N> {
     fn default() -> Self {
         Self {
             registers: Vec::new(),
@@ -95,9 +101,10 @@ impl Default for Slopes {
             result: Duals::new(),
             octaves: Box::new(Octaves {
                 cells: Cells::new(),
+                along: [[0.0; BATCH]; 3],
                 sample: Sample {
                     noise: [0.0; BATCH],
-                    gradient: [[0.0; BATCH]; 3],
+                    gradient: [[0.0; BATCH]; N],
                     depth: [0.0; BATCH],
                 },
                 total: Duals::new(),
@@ -107,14 +114,16 @@ impl Default for Slopes {
     }
 }
 
-impl Slopes {
+impl<const N: usize> Slopes<N> {
     /// Makes room for the code, sets its constants and the gradients of its inputs.
     pub(crate) fn prepare(&mut self, code: &Code) {
         let grown = self.registers.len() < code.registers;
         if grown {
             self.registers.resize_with(code.registers, Duals::new);
-            for axis in 0..3 {
-                self.registers[axis].gradient[axis].fill(1.0);
+            if N == 3 {
+                for axis in 0..N {
+                    self.registers[axis].gradient[axis].fill(1.0);
+                }
             }
         }
         let same = self.constants.len() == code.constants.len()
@@ -128,6 +137,19 @@ impl Slopes {
                 register.set_constant(*constant);
             }
             self.constants.clone_from(&code.constants);
+        }
+    }
+
+    /// Sets the directions along which the derivatives of the points from `start` on are wanted.
+    pub(crate) fn aim(&mut self, direction: [&[f64]; 3], start: usize) {
+        const { assert!(N == 1, "a gradient by coordinates needs no direction") }
+        for (register, parts) in self.registers.iter_mut().zip(direction) {
+            let parts = &parts[start..];
+            let n = parts.len().min(BATCH);
+            let lanes = &mut register.gradient[0];
+            lanes[..n].copy_from_slice(&parts[..n]);
+            // Lanes without a point compute the last one again.
+            lanes[n..].fill(parts[n - 1]);
         }
     }
 
@@ -156,7 +178,7 @@ impl Slopes {
     }
 
     /// The duals of a register.
-    pub(crate) fn register(&self, register: usize) -> &Duals {
+    pub(crate) fn register(&self, register: usize) -> &Duals<N> {
         &self.registers[register]
     }
 
@@ -176,10 +198,11 @@ impl Slopes {
                 #[inline(always)]
                 |a, b, c| Dual {
                     value: arithmetic::select(a.value, b.value, c.value),
-                    gradient: [0, 1, 2].map(
-                        #[inline(always)]
-                        |i| arithmetic::select(a.value, b.gradient[i], c.gradient[i]),
-                    ),
+                    gradient: if a.value < 0.0 {
+                        b.gradient
+                    } else {
+                        c.gradient
+                    },
                 },
             ),
             Operation::Length => each3(n, [a, b, c], out, length),
@@ -237,35 +260,40 @@ impl Slopes {
                 },
             ),
             Operation::Noise(lattice) => {
-                let Octaves { cells, sample, .. } = &mut *self.octaves;
-                let Sample {
-                    noise, gradient, ..
-                } = sample;
+                let Octaves {
+                    cells,
+                    along,
+                    sample,
+                    ..
+                } = &mut *self.octaves;
                 lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
-                lanes::values_gradients(simd, n, *lattice, cells, noise, gradient);
-                let [gx, gy, gz] = gradient;
+                if N == 1 {
+                    directions(n, &IDENTITY, [a, b, c], along);
+                }
+                sample.fill(simd, n, *lattice, cells, along);
                 for i in 0..n {
-                    let slopes = [f64::from(gx[i]), f64::from(gy[i]), f64::from(gz[i])];
-                    out.set(
-                        i,
-                        pull(slopes, [a.at(i), b.at(i), c.at(i)], f64::from(noise[i])),
-                    );
+                    let noise = f64::from(sample.noise[i]);
+                    out.set(i, sample.pulled(i, [a, b, c], noise));
                 }
                 return count.points as u64;
             }
             Operation::Cascade(cascade) => {
                 let footprint = &self.registers[FOOTPRINT].value;
-                let noises = self.octaves.run(
-                    simd,
-                    cascade,
-                    count,
-                    [&a.value, &b.value, &c.value],
-                    footprint,
-                );
+                let noises = self.octaves.run(simd, cascade, count, [a, b, c], footprint);
                 let total = &self.octaves.total;
                 for i in 0..n {
-                    let Dual { value, gradient } = total.at(i);
-                    out.set(i, pull(gradient, [a.at(i), b.at(i), c.at(i)], value));
+                    let total = total.at(i);
+                    // Along a direction the octaves have it already.
+                    let dual = if N == 1 {
+                        total
+                    } else {
+                        pull(
+                            triple(total.gradient),
+                            [a.at(i), b.at(i), c.at(i)],
+                            total.value,
+                        )
+                    };
+                    out.set(i, dual);
                 }
                 return noises;
             }
@@ -274,22 +302,93 @@ impl Slopes {
     }
 }
 
-/// A function of a place, given its slopes there and the place's own gradients.
+const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+/// The three derivatives by coordinates; not to be asked of others.
 #[inline(always)]
-fn pull([s, t, u]: [f64; 3], [a, b, c]: [Dual; 3], value: f64) -> Dual {
-    let (a, b, c) = (a.gradient, b.gradient, c.gradient);
-    Dual {
-        value,
-        gradient: [
-            s * a[0] + t * b[0] + u * c[0],
-            s * a[1] + t * b[1] + u * c[1],
-            s * a[2] + t * b[2] + u * c[2],
-        ],
+fn triple<const N: usize>(gradient: [f64; N]) -> [f64; 3] {
+    let mut three = [0.0; 3];
+    for (part, given) in three.iter_mut().zip(gradient) {
+        *part = given;
+    }
+    three
+}
+
+/// The directions of a place's way, turned by an octave's matrix.
+#[inline(always)]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "derivatives are f32 as the noise's own"
+)]
+fn directions<const N: usize>(
+    n: usize,
+    [p, q, r]: &[[f64; 3]; 3],
+    [a, b, c]: [&Duals<N>; 3],
+    along: &mut [[f32; BATCH]; 3],
+) {
+    assert!(n <= BATCH);
+    let (x, y, z) = (&a.gradient[0], &b.gradient[0], &c.gradient[0]);
+    let [s, t, u] = along;
+    for i in 0..n {
+        s[i] = (p[0] * x[i] + p[1] * y[i] + p[2] * z[i]) as f32;
+        t[i] = (q[0] * x[i] + q[1] * y[i] + q[2] * z[i]) as f32;
+        u[i] = (r[0] * x[i] + r[1] * y[i] + r[2] * z[i]) as f32;
     }
 }
 
+impl<const N: usize> Sample<N> {
+    /// The noise in `cells`: with its gradient, or its derivative along `along`.
+    #[inline(always)]
+    fn fill<S: Simd>(
+        &mut self,
+        simd: S,
+        n: usize,
+        lattice: Lattice,
+        cells: &mut Cells,
+        along: &[[f32; BATCH]; 3],
+    ) {
+        let Self {
+            noise, gradient, ..
+        } = self;
+        match gradient.as_mut_slice() {
+            [slope] => lanes::values_along(simd, n, lattice, cells, along, noise, slope),
+            [x, y, z] => lanes::values_gradients(simd, n, lattice, cells, noise, [x, y, z]),
+            _ => unreachable!("derivatives are by one or three variables"),
+        }
+    }
+
+    #[inline(always)]
+    fn slopes(&self, i: usize) -> [f64; N] {
+        let mut slopes = [0.0; N];
+        for (slope, lanes) in slopes.iter_mut().zip(&self.gradient) {
+            *slope = f64::from(lanes[i]);
+        }
+        slopes
+    }
+
+    /// A value with these derivatives at a place that has its own.
+    #[inline(always)]
+    fn pulled(&self, i: usize, [a, b, c]: [&Duals<N>; 3], value: f64) -> Dual<N> {
+        let gradient = self.slopes(i);
+        if N == 1 {
+            return Dual { value, gradient };
+        }
+        pull(triple(gradient), [a.at(i), b.at(i), c.at(i)], value)
+    }
+}
+
+/// A function of a place, given its slopes there and the place's own gradients.
 #[inline(always)]
-fn length(a: Dual, b: Dual, c: Dual) -> Dual {
+fn pull<const N: usize>([s, t, u]: [f64; 3], [a, b, c]: [Dual<N>; 3], value: f64) -> Dual<N> {
+    let mut gradient = a.gradient;
+    for (i, part) in gradient.iter_mut().enumerate() {
+        *part = s * *part + t * b.gradient[i] + u * c.gradient[i];
+    }
+    Dual { value, gradient }
+}
+
+#[inline(always)]
+fn length<const N: usize>(a: Dual<N>, b: Dual<N>, c: Dual<N>) -> Dual<N> {
     let length = arithmetic::length([a.value, b.value, c.value]);
     let inverse = arithmetic::inverse(length);
     pull(
@@ -299,20 +398,22 @@ fn length(a: Dual, b: Dual, c: Dual) -> Dual {
     )
 }
 
-impl Octaves {
+impl<const N: usize> Octaves<N> {
     #[inline(always)]
     fn run<S: Simd>(
         &mut self,
         simd: S,
         cascade: &Cascade,
         count: Count,
-        at: [&Lanes; 3],
+        at: [&Duals<N>; 3],
         footprint: &Lanes,
     ) -> u64 {
         let n = count.lanes;
         let mut noises = 0;
+        let place = at.map(|part| &part.value);
         let Self {
             cells,
+            along,
             sample,
             total,
             rest,
@@ -327,15 +428,11 @@ impl Octaves {
                 break;
             }
             noises += live;
-            lanes::place(simd, n, octave, at, cells);
-            lanes::values_gradients(
-                simd,
-                n,
-                octave.lattice,
-                cells,
-                &mut sample.noise,
-                &mut sample.gradient,
-            );
+            lanes::place(simd, n, octave, place, cells);
+            if N == 1 {
+                directions(n, &octave.matrix, at, along);
+            }
+            sample.fill(simd, n, octave.lattice, cells, along);
             add(cascade.model, Place { n, i, octave }, sample, total, rest);
         }
         noises
@@ -343,7 +440,13 @@ impl Octaves {
 }
 
 #[inline(always)]
-fn add(model: Model, at: Place<'_>, sample: &Sample, total: &mut Duals, rest: &mut Duals) {
+fn add<const N: usize>(
+    model: Model,
+    at: Place<'_>,
+    sample: &Sample<N>,
+    total: &mut Duals<N>,
+    rest: &mut Duals<N>,
+) {
     match model {
         Model::Sum(basis) => add_each(
             at,
@@ -387,14 +490,13 @@ fn add(model: Model, at: Place<'_>, sample: &Sample, total: &mut Duals, rest: &m
 }
 
 #[inline(always)]
-fn add_each(
+fn add_each<const N: usize>(
     Place { n, i, octave }: Place<'_>,
-    sample: &Sample,
-    total: &mut Duals,
-    rest: &mut Duals,
-    add: impl Fn(Term, Dual, Carried<Dual>) -> Carried<Dual>,
+    sample: &Sample<N>,
+    total: &mut Duals<N>,
+    rest: &mut Duals<N>,
+    add: impl Fn(Term, Dual<N>, Carried<Dual<N>>) -> Carried<Dual<N>>,
 ) {
-    let [gx, gy, gz] = &sample.gradient;
     let (matrix, amplitude) = (octave.matrix, octave.amplitude);
     assert!(n <= BATCH);
     for lane in 0..n {
@@ -403,14 +505,14 @@ fn add_each(
             amplitude,
             weight: cascade::weight(sample.depth[lane], i),
         };
-        let slopes = [
-            f64::from(gx[lane]),
-            f64::from(gy[lane]),
-            f64::from(gz[lane]),
-        ];
+        let mut gradient = sample.slopes(lane);
+        if N == 3 {
+            let pulled = cascade::pull(&matrix, triple(gradient));
+            gradient.copy_from_slice(&pulled);
+        }
         let noise = Dual {
             value: f64::from(sample.noise[lane]),
-            gradient: cascade::pull(&matrix, slopes),
+            gradient,
         };
         let (sum, handed) = add(term, noise, (total.at(lane), rest.at(lane)));
         total.set(lane, sum);
@@ -419,7 +521,12 @@ fn add_each(
 }
 
 #[inline(always)]
-fn each(n: usize, a: &Duals, out: &mut Duals, f: impl Fn(Dual) -> Dual) {
+fn each<const N: usize>(
+    n: usize,
+    a: &Duals<N>,
+    out: &mut Duals<N>,
+    f: impl Fn(Dual<N>) -> Dual<N>,
+) {
     assert!(n <= BATCH);
     for i in 0..n {
         out.set(i, f(a.at(i)));
@@ -427,7 +534,12 @@ fn each(n: usize, a: &Duals, out: &mut Duals, f: impl Fn(Dual) -> Dual) {
 }
 
 #[inline(always)]
-fn each3(n: usize, [a, b, c]: [&Duals; 3], out: &mut Duals, f: impl Fn(Dual, Dual, Dual) -> Dual) {
+fn each3<const N: usize>(
+    n: usize,
+    [a, b, c]: [&Duals<N>; 3],
+    out: &mut Duals<N>,
+    f: impl Fn(Dual<N>, Dual<N>, Dual<N>) -> Dual<N>,
+) {
     assert!(n <= BATCH);
     for i in 0..n {
         out.set(i, f(a.at(i), b.at(i), c.at(i)));
@@ -435,7 +547,7 @@ fn each3(n: usize, [a, b, c]: [&Duals; 3], out: &mut Duals, f: impl Fn(Dual, Dua
 }
 
 #[inline(always)]
-fn unary_lanes(unary: Unary, n: usize, a: &Duals, out: &mut Duals) {
+fn unary_lanes<const N: usize>(unary: Unary, n: usize, a: &Duals<N>, out: &mut Duals<N>) {
     each(
         n,
         a,
@@ -449,7 +561,13 @@ fn unary_lanes(unary: Unary, n: usize, a: &Duals, out: &mut Duals) {
 }
 
 #[inline(always)]
-fn binary_lanes(binary: Binary, n: usize, a: &Duals, b: &Duals, out: &mut Duals) {
+fn binary_lanes<const N: usize>(
+    binary: Binary,
+    n: usize,
+    a: &Duals<N>,
+    b: &Duals<N>,
+    out: &mut Duals<N>,
+) {
     assert!(n <= BATCH);
     for i in 0..n {
         let (a, b) = (a.at(i), b.at(i));
