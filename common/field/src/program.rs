@@ -64,6 +64,14 @@ impl Program {
         Ok(Self { plan, code })
     }
 
+    /// Whether its values change over the time that it was compiled for.
+    pub fn moves(&self) -> bool {
+        self.plan
+            .steps
+            .iter()
+            .any(|step| matches!(step.act, plan::Act::Time))
+    }
+
     /// Evaluates every root at every point: `out` has one slice per root, each as long as the batch.
     ///
     /// The values are the same to the bit at every level, and a point's values do not depend on

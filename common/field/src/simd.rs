@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd, dispatch};
 
 /// An instruction set that this machine has.
 ///
@@ -67,6 +67,14 @@ impl SimdLevel {
             Level::Neon(_) => "neon",
             _ => "scalar",
         }
+    }
+
+    /// Runs `kernel` compiled for this level: its loops over arrays use the level's registers.
+    ///
+    /// Everything that the kernel calls in its loops must be inlined into it.
+    #[inline(always)]
+    pub fn vectorize<R>(self, kernel: impl FnOnce() -> R) -> R {
+        dispatch!(self.token, simd => simd.vectorize(kernel))
     }
 
     pub(crate) fn token(self) -> Level {

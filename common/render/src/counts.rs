@@ -1,10 +1,11 @@
-//! What rendering took, in integers that are the same on every machine.
+//! What rendering took, in integers that are the same on every machine, but not for every way of cutting into blocks.
 
 use core::ops::AddAssign;
 
 macro_rules! counts {
     ($($(#[doc = $doc:literal])+ $name:ident,)+) => {
-        /// Work done, counted; the sum over the blocks of an image depends on the image alone.
+        /// Work done, counted. Of an image's blocks, pixels, samples, rays, hits and shadows add up to the same
+        /// however it is cut; evaluations and steps depend on which rays were followed together.
         #[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
         pub struct Counts {
             $($(#[doc = $doc])+ pub $name: u64,)+

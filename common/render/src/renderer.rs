@@ -152,7 +152,6 @@ impl ImageRenderer {
                 from_eye: DVec3::ZERO,
                 time: sight.time,
                 grid: self.surface.sight,
-                clear: 0.0,
             });
         }
         work.tracer.trace(
@@ -273,7 +272,6 @@ impl ImageRenderer {
                 from_eye: origin - sight.origin,
                 time: sight.time,
                 grid: self.surface.shadow_grid(touched.distance),
-                clear: 0.0,
             });
         }
         counts.shadow_rays += work.rays.len() as u64;

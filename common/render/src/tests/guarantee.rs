@@ -88,7 +88,6 @@ fn rays(surface: &Surface, view: &View, count: u32) -> Vec<Ray> {
                 from_eye: DVec3::ZERO,
                 time: sight.time,
                 grid: surface.sight,
-                clear: 0.0,
             }
         })
         .collect()
@@ -168,17 +167,38 @@ fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
 }
 
 #[test]
-fn where_the_search_starts_cannot_be_seen() {
-    let scene = scenes::hypertexture();
-    let view = View::new(&scene.camera, &scene.film, 0.0);
-    let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
-    let mut rays = rays(&surface, &view, 200);
-    let (hits, _) = trace(&surface, Goal::Distance, &rays);
-    for share in [0.3, 0.9, 0.999_9] {
-        for (ray, hit) in rays.iter_mut().zip(&hits) {
-            ray.clear = hit.distance().unwrap_or(5.0) * share;
+fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
+    for (name, scene) in scenes::all() {
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let random = |ray: u32, dimension: u32| unit(hash(&[ray, dimension, 7]));
+        // Sixteen patches of some pixels, each a bundle at the start and four at the end.
+        let rays: Vec<Ray> = (0..1024)
+            .map(|index| {
+                let patch = index / 64;
+                let place = [0, 1].map(|axis| {
+                    let side = [scene.film.resolution.width, scene.film.resolution.height];
+                    let corner = f64::from(side[axis as usize]) * random(patch, 10 + axis);
+                    let cell = f64::from((index >> (4 + axis)) & 1) + random(index, axis);
+                    corner + 1.5 * cell
+                });
+                let instant = random(index, 2);
+                let sight = view.sight(&Sample { place, instant });
+                Ray {
+                    origin: sight.origin,
+                    direction: sight.direction,
+                    from_eye: DVec3::ZERO,
+                    time: sight.time,
+                    grid: surface.sight,
+                }
+            })
+            .collect();
+        let (hits, counts) = trace(&surface, Goal::Distance, &rays);
+        assert!(counts.cone_steps > 0, "{name}");
+        for (ray, hit) in rays.iter().zip(&hits) {
+            let (alone, _) = trace(&surface, Goal::Distance, std::slice::from_ref(ray));
+            assert_eq!(alone[0], *hit, "{name}: {ray:?}");
         }
-        // Just short of the hit's own grid point the search may begin anywhere.
-        assert_eq!(trace(&surface, Goal::Distance, &rays).0, hits);
+        assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
     }
 }

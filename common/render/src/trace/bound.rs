@@ -46,6 +46,11 @@ pub(crate) fn clip(bound: &Bound, origin: DVec3, direction: DVec3) -> Option<(f6
     (start <= end).then_some((start, end))
 }
 
+/// Whether a bound cuts the surface off, and not only holds it.
+pub(crate) fn cuts(bound: &Bound) -> bool {
+    matches!(bound, Bound::Box { .. })
+}
+
 /// Whether the surface may be at a place: outside of a box it is cut off.
 #[inline]
 pub(crate) fn contains(bound: &Bound, place: DVec3) -> bool {

@@ -1,6 +1,6 @@
 //! How far a ray may go from a place where the field has a known value.
 
-use field::{Interval, Modulus, Program, Region, Surroundings};
+use field::{Interval, Modulus, Program, Region, Surroundings, Taylor};
 use glam::DVec3;
 use scene::description::{Bound, Seed};
 
@@ -8,10 +8,14 @@ use super::grid::FAR;
 use crate::view::Footprint;
 
 /// Distances are shortened by this share, for the rounding of their own few operations.
-const CAUTION: f64 = 1.0 - 1e-9;
+pub(crate) const CAUTION: f64 = 1.0 - 1e-9;
 
 /// The least slope that is reckoned with, per metre: roots farther than its inverse are not ruled out.
-const FLAT: f64 = 1e-12;
+pub(crate) const FLAT: f64 = 1e-12;
+
+/// By this share of its extent a bound is widened before the field is bounded over it, so that
+/// places just outside serve too.
+pub(crate) const MARGIN: f64 = 1.0 / 16.0;
 
 /// Room around a bound for places that rounding puts just outside, relative.
 const ROOM: f64 = 1e-8;
@@ -28,32 +32,18 @@ pub(crate) enum Known {
 }
 
 impl Known {
-    /// How fast the known part grows along `direction` at `place`; never less further on.
-    #[inline]
-    pub(crate) fn growth(self, place: DVec3, direction: DVec3) -> f64 {
+    /// How fast the known part grows at a place along a direction, both given axis by axis; never less further on.
+    #[inline(always)]
+    pub(crate) fn growth_at(self, [(x, dx), (y, dy), (z, dz)]: [(f64, f64); 3]) -> f64 {
         match self {
             Self::Nothing => 0.0,
-            Self::Height => direction.z,
+            Self::Height => dz,
             Self::Radius => {
-                let square = place.dot(place);
-                if square > 0.0 {
-                    place.dot(direction) / square.sqrt()
-                } else {
-                    -1.0
-                }
+                let along = x * dx + y * dy + z * dz;
+                let size = (x * x + y * y + z * z).sqrt();
+                if size > 0.0 { along / size } else { -1.0 }
             }
         }
-    }
-
-    /// The growth along a whole ray between two places; `None` where it changes too much for
-    /// one answer to serve.
-    pub(crate) fn growth_along(self, from: DVec3, to: DVec3, direction: DVec3) -> Option<Interval> {
-        const CHANGE_MAX: f64 = 0.02;
-        // Grid points lie up to a gap outside of both places.
-        const ROOM: f64 = 1e-6;
-        let low = self.growth(from, direction) - ROOM;
-        let high = self.growth(to, direction) + ROOM;
-        (high - low < CHANGE_MAX).then_some(Interval::new(low, high))
     }
 
     /// What is known of a field that was split along its seed.
@@ -65,95 +55,80 @@ impl Known {
     }
 }
 
-/// One bound of a field's change, with the values for which it reaches farthest.
-///
-/// The values are those for a ray along which the known part does not change; for
-/// other rays the choice is good rather than best. Any choice is sound.
-#[derive(Clone, Copy, Debug)]
-struct Span {
-    offset: f64,
-    slope: f64,
-    from: f64,
-    to: f64,
+/// One bound of a field's change: f moves by no more than offset + slope · distance.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Pick {
+    pub(crate) offset: f64,
+    pub(crate) slope: f64,
 }
+
+/// Bins of values, two to a factor of two: from 2⁻⁴⁸ to 2³².
+const BINS: usize = 160;
+
+/// The value at which the second bin begins, as the upper bits of an f64.
+const FIRST_BIN: u64 = (1023 - 48) << 1;
 
 /// Bounds of a field's change around places at similar distances from the eye.
 #[derive(Clone, Debug)]
 pub(crate) struct Clearance {
-    /// Offsets rise and slopes fall, in a convex chain.
-    levels: Vec<Span>,
+    /// By the field's value, the bound that reaches farthest. Any choice would be sound.
+    picks: Vec<Pick>,
+    /// How far the field may fall below its tangent.
+    pub(crate) tangent: Taylor,
     /// The bounds hold no farther than this from the place, metres.
-    reach: f64,
+    pub(crate) reach: f64,
 }
+
+/// A tangent that bounds nothing.
+const NO_TANGENT: Taylor = Taylor {
+    offset: f64::INFINITY,
+    slope: 0.0,
+    curvature: 1.0,
+};
 
 impl Clearance {
     /// The bounds of `modulus`, each with `rounding` added to its offset.
-    fn new(modulus: &Modulus, rounding: f64, reach: f64) -> Self {
-        let mut chain: Vec<(f64, f64)> = Vec::new();
-        for level in &modulus.levels {
-            let (offset, slope) = (level.offset + rounding, level.slope);
-            let sound = offset.is_finite() && slope.is_finite() && slope >= 0.0;
-            if !sound || chain.last().is_some_and(|last| last.1 <= slope) {
-                continue;
-            }
-            // Of three in a row the middle one is of use only below the line through the others.
-            while let [.., a, b] = chain[..] {
-                let middle_is_above = (b.1 - a.1) * (offset - a.0) >= (slope - a.1) * (b.0 - a.0);
-                if !middle_is_above {
-                    break;
-                }
-                chain.pop();
-            }
-            chain.push((offset, slope));
-        }
-        // Two levels reach equally far at the value where their lines meet zero together.
-        let meet = |(o0, s0): (f64, f64), (o1, s1): (f64, f64)| (o1 * s0 - o0 * s1) / (s0 - s1);
-        let levels = (0..chain.len())
-            .map(|at| Span {
-                offset: chain[at].0,
-                slope: chain[at].1,
-                from: match at {
-                    0 => f64::NEG_INFINITY,
-                    _ => meet(chain[at - 1], chain[at]),
-                },
-                to: match chain.get(at + 1) {
-                    Some(&next) => meet(chain[at], next),
-                    None => f64::INFINITY,
-                },
+    fn new(modulus: &Modulus, rounding: f64, tangent: Option<Taylor>, reach: f64) -> Self {
+        let levels: Vec<Pick> = modulus
+            .levels
+            .iter()
+            .map(|level| Pick {
+                offset: level.offset + rounding,
+                slope: level.slope,
+            })
+            .filter(|level| level.offset.is_finite() && level.slope.is_finite())
+            .collect();
+        let nothing = Pick {
+            offset: f64::INFINITY,
+            slope: 1.0,
+        };
+        let picks = (0..BINS)
+            .map(|bin| {
+                // A quarter into the bin.
+                let value = f64::from_bits(((FIRST_BIN + bin as u64) << 51) | (1 << 49));
+                let reach = |pick: &Pick| {
+                    let slope = if pick.slope > FLAT { pick.slope } else { FLAT };
+                    (value - pick.offset) / slope
+                };
+                levels
+                    .iter()
+                    .copied()
+                    .max_by(|a, b| reach(a).total_cmp(&reach(b)))
+                    .unwrap_or(nothing)
             })
             .collect();
-        Self { levels, reach }
+        Self {
+            picks,
+            tangent: tangent.unwrap_or(NO_TANGENT),
+            reach,
+        }
     }
 
-    /// How far ahead and back of a place no root can be, where the value is `value`.
-    ///
-    /// `growth` encloses that of the known part from the place on, and up to it.
-    /// `hint` is where to look among the levels, and where to look next time.
+    /// The bound that reaches farthest from a place where the field has that value.
     #[inline]
-    pub(crate) fn spans(&self, value: f64, growth: Interval, hint: &mut usize) -> (f64, f64) {
-        let Some(last) = self.levels.len().checked_sub(1) else {
-            return (0.0, 0.0);
-        };
-        let mut at = (*hint).min(last);
-        while value > self.levels[at].to {
-            at += 1;
-        }
-        while value < self.levels[at].from {
-            at -= 1;
-        }
-        *hint = at;
-        let level = self.levels[at];
-        let rest = value - level.offset;
-        if rest <= 0.0 {
-            return (0.0, 0.0);
-        }
-        let (fall, rise) = (level.slope - growth.low, level.slope + growth.high);
-        let fall = if fall > FLAT { fall } else { FLAT };
-        let rise = if rise > FLAT { rise } else { FLAT };
-        // rest / fall and rest / rise with one division.
-        let share = rest * CAUTION / (fall * rise);
-        let cut = |span: f64| if span < self.reach { span } else { self.reach };
-        (cut(share * rise), cut(share * fall))
+    pub(crate) fn pick(&self, value: f64) -> Pick {
+        let bin = (value.to_bits() >> 51).saturating_sub(FIRST_BIN);
+        self.picks[usize::try_from(bin).unwrap_or(0).min(BINS - 1)]
     }
 }
 
@@ -229,17 +204,19 @@ impl Around<'_> {
             footprint_slope: self.footprint.angle,
         };
         let whole = self.field.modulus(&surroundings);
+        let tangent = self.field.taylor(&surroundings);
         match (self.rest, whole.levels.first()) {
             (Some(rest), Some(finest)) => {
-                Clearance::new(&rest.modulus(&surroundings), finest.offset, reach)
+                let rest = rest.modulus(&surroundings);
+                Clearance::new(&rest, finest.offset, tangent, reach)
             }
-            _ => Clearance::new(&whole, 0.0, reach),
+            _ => Clearance::new(&whole, 0.0, tangent, reach),
         }
     }
 
-    /// The part of the bound that is no farther from the eye than `far`, or more.
+    /// The part of the widened bound that is no farther from the eye than `far`, or more.
     fn region(&self, far: f64) -> Region {
-        match *self.bound {
+        match widened(self.bound) {
             Bound::Shell { inner, outer } => Region::Shell {
                 inner: inner * (1.0 - ROOM),
                 outer: outer * (1.0 + ROOM),
@@ -263,6 +240,36 @@ impl Around<'_> {
     }
 }
 
+/// The bound with its margin.
+pub(crate) fn widened(bound: &Bound) -> Bound {
+    match *bound {
+        Bound::Shell { inner, outer } => {
+            let margin = (outer - inner) * MARGIN;
+            // Not to the centre, where directions are lost.
+            let least = inner * 0.75;
+            let low = inner - margin;
+            Bound::Shell {
+                inner: if low > least { low } else { least },
+                outer: outer + margin,
+            }
+        }
+        Bound::Slab { low, high } => {
+            let margin = (high - low) * MARGIN;
+            Bound::Slab {
+                low: low - margin,
+                high: high + margin,
+            }
+        }
+        Bound::Box { min, max } => {
+            let margin = |axis: usize| (max[axis] - min[axis]) * MARGIN;
+            Bound::Box {
+                min: [0, 1, 2].map(|axis| min[axis] - margin(axis)),
+                max: [0, 1, 2].map(|axis| max[axis] + margin(axis)),
+            }
+        }
+    }
+}
+
 /// The exponent e of 2ᵉ ≤ `value` < 2ᵉ⁺¹, for positive, normal values.
 #[inline]
 fn exponent(value: f64) -> i64 {
@@ -279,18 +286,8 @@ mod tests {
     use super::*;
     use field::Level;
 
-    fn clearance(levels: &[(f64, f64)]) -> Clearance {
-        let modulus = Modulus {
-            levels: levels
-                .iter()
-                .map(|&(offset, slope)| Level { offset, slope })
-                .collect(),
-        };
-        Clearance::new(&modulus, 0.0, 1e6)
-    }
-
     #[test]
-    fn the_best_level_is_found_from_every_hint() {
+    fn the_pick_is_the_level_that_reaches_farthest() {
         let levels = [
             (0.0, 9.0),
             (0.1, 6.0),
@@ -299,44 +296,26 @@ mod tests {
             (2.0, 1.5),
             (5.0, 1.0),
         ];
-        let clearance = clearance(&levels);
-        for value in [0.01, 0.09, 0.2, 0.5, 1.0, 3.0, 7.0, 100.0] {
-            for growth in [-1.0, -0.3, 0.0, 0.3] {
-                let best = levels
-                    .iter()
-                    .map(|(offset, slope)| (value - offset) / (slope - growth))
-                    .fold(0.0, f64::max);
-                // The level is the best for a growth of 0, and not much worse for others.
-                let least = if growth == 0.0 { 0.999_999 } else { 0.6 };
-                for hint in 0..levels.len() {
-                    let mut found_at = hint;
-                    let (ahead, behind) =
-                        clearance.spans(value, Interval::point(growth), &mut found_at);
-                    assert!(ahead <= best && ahead >= best * least, "{value} {growth}");
-                    let (offset, slope) = levels[found_at];
-                    let exact = ((value - offset) / (slope + growth)).clamp(0.0, 1e6);
-                    assert!(behind <= exact && behind >= exact * 0.999_999);
-                }
-            }
+        let modulus = Modulus {
+            levels: levels
+                .iter()
+                .map(|&(offset, slope)| Level { offset, slope })
+                .collect(),
+        };
+        let clearance = Clearance::new(&modulus, 0.0, None, 1e6);
+        let mut value = 1e-3;
+        while value < 1e3 {
+            let reach = |(offset, slope): (f64, f64)| ((value - offset) / slope).max(0.0);
+            let pick = clearance.pick(value);
+            let best = levels.iter().copied().map(reach).fold(0.0, f64::max);
+            assert!(reach((pick.offset, pick.slope)) > 0.8 * best, "{value}");
+            value *= 1.1;
         }
-    }
-
-    #[test]
-    fn a_level_that_is_never_best_is_dropped() {
-        let count = |levels: &[(f64, f64)]| clearance(levels).levels.len();
-        assert_eq!(count(&[(0.0, 4.0), (1.0, 3.9), (2.0, 1.0)]), 2);
-        assert_eq!(count(&[(0.0, 4.0), (0.5, 2.0), (2.0, 1.0)]), 3);
-        let nothing = clearance(&[]).spans(3.0, Interval::point(0.0), &mut 0);
-        assert_eq!(nothing, (0.0, 0.0));
-    }
-
-    #[test]
-    fn no_span_exceeds_its_reach() {
-        let (ahead, behind) = clearance(&[(0.0, 1.0)]).spans(5.0, Interval::point(1.0), &mut 0);
-        assert_eq!(ahead, 1e6);
-        assert!((behind - 2.5).abs() < 1e-6);
-        let level = clearance(&[(0.0, 1.0)]).spans(-5.0, Interval::point(0.0), &mut 0);
-        assert_eq!(level, (0.0, 0.0));
+        for odd in [0.0, 1e-300, 1e300, f64::INFINITY] {
+            assert!(clearance.pick(odd).slope > 0.0);
+        }
+        let nothing = Clearance::new(&Modulus::default(), 0.0, None, 1e6).pick(3.0);
+        assert_eq!(nothing.offset, f64::INFINITY);
     }
 
     #[test]
@@ -345,7 +324,8 @@ mod tests {
         let mut last = -1.0;
         for step in 0..100 {
             let place = DVec3::new(-3.0, 3.0, 1.0) + direction * (f64::from(step) * 0.1);
-            let growth = Known::Radius.growth(place, direction);
+            let growth =
+                Known::Radius.growth_at([0, 1, 2].map(|axis| (place[axis], direction[axis])));
             assert!(growth >= last);
             last = growth;
         }

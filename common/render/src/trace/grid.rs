@@ -48,7 +48,7 @@ impl Grid {
     }
 
     /// The distance of a point; `index` is not negative.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn place(self, index: i64) -> f64 {
         f64::from_bits(self.base + (index.cast_unsigned() << self.shift)) - self.origin
     }
@@ -56,7 +56,7 @@ impl Grid {
     /// The first point at `t` or beyond; for some `t` in the last 2⁻¹² of a gap, the point before.
     ///
     /// `t` beyond [`FAR`] is taken as that.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn first_from(self, t: f64) -> i64 {
         let t = if t < FAR { t } else { FAR };
         let bits = (t + self.origin).to_bits();
@@ -65,6 +65,65 @@ impl Grid {
         }
         let last = (1u64 << self.shift) - 1;
         ((bits - self.base + last) >> self.shift).cast_signed()
+    }
+}
+
+/// A grid as lanes compute with it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Steps {
+    base: u64,
+    /// One less than the distance between neighbours, in units of the last place.
+    last: u64,
+    origin: f64,
+}
+
+impl Grid {
+    /// The grid for computing with distances instead of indices.
+    pub(crate) fn steps(self) -> Steps {
+        Steps {
+            base: self.base,
+            last: (1 << self.shift) - 1,
+            origin: self.origin,
+        }
+    }
+}
+
+impl Steps {
+    /// The first point at `t` or beyond; for some `t` in the last 2⁻¹² of a gap, the point before.
+    ///
+    /// `t` beyond [`FAR`] is taken as that.
+    #[inline(always)]
+    pub(crate) fn from(self, t: f64) -> f64 {
+        let t = if t < FAR { t } else { FAR };
+        let bits = (t + self.origin).to_bits();
+        let first = (t <= 0.0) | (bits <= self.base);
+        let beyond = if first {
+            0
+        } else {
+            bits.wrapping_sub(self.base)
+        };
+        let beyond = beyond.wrapping_add(self.last) & !self.last;
+        f64::from_bits(self.base.wrapping_add(beyond)) - self.origin
+    }
+
+    /// The next point after a point.
+    #[inline(always)]
+    pub(crate) fn after(self, t: f64) -> f64 {
+        let bits = (t + self.origin).to_bits();
+        f64::from_bits(bits.wrapping_add(self.last).wrapping_add(1)) - self.origin
+    }
+
+    /// The point before a point that is not the first.
+    #[inline(always)]
+    pub(crate) fn before(self, t: f64) -> f64 {
+        let bits = (t + self.origin).to_bits();
+        f64::from_bits(bits.wrapping_sub(self.last).wrapping_sub(1)) - self.origin
+    }
+
+    /// Whether a point is the first.
+    #[inline(always)]
+    pub(crate) fn is_first(self, t: f64) -> bool {
+        (t + self.origin).to_bits() <= self.base
     }
 }
 
@@ -123,6 +182,31 @@ mod tests {
                 assert_eq!(grid.first_from(grid.place(index)), index);
                 t *= 1.000_37;
             }
+        }
+    }
+
+    #[test]
+    fn steps_go_to_the_points_of_the_grid() {
+        for grid in [
+            Grid::from_eye(3e-5),
+            Grid::even(0.01, 1e5),
+            Grid::even(1e-5, 1.0),
+        ] {
+            let steps = grid.steps();
+            let mut t = 1e-8;
+            while t < 1e11 {
+                let index = grid.first_from(t);
+                let place = grid.place(index);
+                assert_eq!(steps.from(t), place);
+                assert_eq!(steps.after(place), grid.place(index + 1));
+                assert_eq!(steps.is_first(place), index == 0);
+                if index > 0 {
+                    assert_eq!(steps.before(place), grid.place(index - 1));
+                }
+                t *= 1.000_37;
+            }
+            assert_eq!(steps.from(-3.0), grid.place(0));
+            assert_eq!(steps.from(f64::INFINITY), grid.place(grid.first_from(FAR)));
         }
     }
 }

@@ -4,11 +4,15 @@
 //! distance is then polished between that point and the one before. How the search
 //! gets there ([`tracer`]) decides only what need not be looked at.
 
+pub(crate) mod batch;
 pub(crate) mod bound;
 pub(crate) mod bracket;
+pub(crate) mod bundle;
 pub(crate) mod clearance;
 pub(crate) mod grid;
 pub mod methods;
+pub(crate) mod polish;
+pub(crate) mod search;
 pub(crate) mod split;
 pub(crate) mod surface;
 pub(crate) mod tracer;

@@ -37,6 +37,8 @@ pub(crate) struct Surface {
     pub(crate) footprint: Footprint,
     /// The grid of every camera ray.
     pub(crate) sight: Grid,
+    /// Whether the field changes while the shutter is open.
+    pub(crate) moves: bool,
 }
 
 impl Surface {
@@ -79,6 +81,7 @@ impl Surface {
             Grid::even(spacing, spacing * EVEN_POINTS)
         };
         Ok(Self {
+            moves: program.moves(),
             program,
             level,
             clearances,

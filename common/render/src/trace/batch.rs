@@ -1,0 +1,165 @@
+//! Places along many rays, and the field's values there: structure of arrays.
+
+use field::{BATCH, Points, Scratch};
+use glam::DVec3;
+
+use super::surface::Surface;
+
+/// One number per lane.
+pub(crate) type Lanes = [f64; BATCH];
+
+/// What of a ray decides where its places are and how wide a pixel is there.
+pub(crate) struct Paths {
+    pub(crate) origin: [Lanes; 3],
+    pub(crate) direction: [Lanes; 3],
+    /// ‖from eye‖².
+    pub(crate) eye_square: Lanes,
+    /// 2 · from eye · direction.
+    pub(crate) eye_along: Lanes,
+    pub(crate) time: Lanes,
+}
+
+/// Places and values, lane by lane.
+pub(crate) struct Batch {
+    pub(crate) place: [Lanes; 3],
+    /// From the eye, metres.
+    pub(crate) distance: Lanes,
+    pub(crate) footprint: Lanes,
+    pub(crate) value: Lanes,
+    /// The value's derivative along the ray.
+    pub(crate) slope: Lanes,
+}
+
+impl Default for Paths {
+    fn default() -> Self {
+        Self {
+            origin: [[0.0; BATCH]; 3],
+            direction: [[0.0; BATCH]; 3],
+            eye_square: [0.0; BATCH],
+            eye_along: [0.0; BATCH],
+            time: [0.0; BATCH],
+        }
+    }
+}
+
+impl Default for Batch {
+    fn default() -> Self {
+        Self {
+            place: [[0.0; BATCH]; 3],
+            distance: [0.0; BATCH],
+            footprint: [0.0; BATCH],
+            value: [0.0; BATCH],
+            slope: [0.0; BATCH],
+        }
+    }
+}
+
+impl Paths {
+    /// Puts a ray into a lane.
+    #[inline]
+    pub(crate) fn set(
+        &mut self,
+        lane: usize,
+        origin: DVec3,
+        direction: DVec3,
+        from_eye: DVec3,
+        time: f64,
+    ) {
+        for axis in 0..3 {
+            self.origin[axis][lane] = origin[axis];
+            self.direction[axis][lane] = direction[axis];
+        }
+        self.eye_square[lane] = from_eye.dot(from_eye);
+        self.eye_along[lane] = 2.0 * from_eye.dot(direction);
+        self.time[lane] = time;
+    }
+
+    /// Moves one lane into another.
+    #[inline]
+    pub(crate) fn copy(&mut self, from: usize, to: usize) {
+        for axis in 0..3 {
+            self.origin[axis][to] = self.origin[axis][from];
+            self.direction[axis][to] = self.direction[axis][from];
+        }
+        self.eye_square[to] = self.eye_square[from];
+        self.eye_along[to] = self.eye_along[from];
+        self.time[to] = self.time[from];
+    }
+}
+
+impl Batch {
+    /// The places at distances `t` along the first `n` paths.
+    #[inline(always)]
+    pub(crate) fn go(&mut self, surface: &Surface, n: usize, paths: &Paths, t: &Lanes) {
+        assert!(n <= BATCH);
+        let [x, y, z] = &mut self.place;
+        let ([ox, oy, oz], [dx, dy, dz]) = (&paths.origin, &paths.direction);
+        for i in 0..n {
+            x[i] = ox[i] + dx[i] * t[i];
+            y[i] = oy[i] + dy[i] * t[i];
+            z[i] = oz[i] + dz[i] * t[i];
+        }
+        let footprint = surface.footprint;
+        for (i, t) in t[..n].iter().copied().enumerate() {
+            let square = paths.eye_square[i] + t * (paths.eye_along[i] + t);
+            // From the eye itself the root is that of t², which is t.
+            let distance = if paths.eye_square[i] > 0.0 {
+                square.sqrt()
+            } else {
+                t
+            };
+            self.distance[i] = distance;
+            self.footprint[i] = footprint.at(distance);
+        }
+    }
+
+    fn points<'a>(&'a self, n: usize, paths: &'a Paths) -> Points<'a> {
+        let [x, y, z] = &self.place;
+        Points {
+            x: &x[..n],
+            y: &y[..n],
+            z: &z[..n],
+            footprint: &self.footprint[..n],
+            time: &paths.time[..n],
+        }
+    }
+
+    /// Evaluates the field at the places.
+    pub(crate) fn evaluate(
+        &mut self,
+        surface: &Surface,
+        n: usize,
+        paths: &Paths,
+        scratch: &mut Scratch,
+    ) {
+        let mut value = [0.0; BATCH];
+        surface.program.evaluate(
+            surface.level,
+            &self.points(n, paths),
+            scratch,
+            &mut [&mut value[..n]],
+        );
+        self.value[..n].copy_from_slice(&value[..n]);
+    }
+
+    /// Evaluates the field at the places, and its derivative along the paths.
+    pub(crate) fn evaluate_along(
+        &mut self,
+        surface: &Surface,
+        n: usize,
+        paths: &Paths,
+        scratch: &mut Scratch,
+    ) {
+        let (mut value, mut slope) = ([0.0; BATCH], [0.0; BATCH]);
+        let [x, y, z] = &paths.direction;
+        surface.program.evaluate_along(
+            surface.level,
+            &self.points(n, paths),
+            [&x[..n], &y[..n], &z[..n]],
+            scratch,
+            [&mut value[..n], &mut slope[..n]],
+        );
+        self.value[..n].copy_from_slice(&value[..n]);
+        self.slope[..n].copy_from_slice(&slope[..n]);
+    }
+}
