@@ -166,8 +166,7 @@ impl<const N: usize> Dual<N> {
     }
 
     #[inline(always)]
-    #[allow(dead_code, reason = "as the trait's")]
-    fn binary(self, other: Self, binary: Binary) -> Self {
+    pub(crate) fn binary(self, other: Self, binary: Binary) -> Self {
         let value = binary.value(self.value, other.value);
         self.chain2(other, value, binary.slopes(self.value, other.value, value))
     }

@@ -16,6 +16,7 @@ pub(crate) mod tests;
 use fearless_simd::dispatch;
 
 use crate::interval::Interval;
+use crate::lanes::Lanes;
 use crate::modulus::Modulus;
 use crate::points::{Points, Scratch};
 use crate::simd::SimdLevel;
@@ -102,13 +103,7 @@ impl Program {
             let count = dispatch!(level.token(), simd => machine.run(simd, &self.code, points, start, noise_evaluations));
             let end = start + count.points;
             for (out, root) in out.iter_mut().zip(&self.code.roots) {
-                for (out, value) in out[start..end].iter_mut().zip(machine.register(*root)) {
-                    *out = if value.is_nan() {
-                        f64::INFINITY
-                    } else {
-                        *value
-                    };
-                }
+                numbers(&mut out[start..end], machine.register(*root), f64::INFINITY);
             }
             start = end;
         }
@@ -146,19 +141,13 @@ impl Program {
         while start < n {
             let count = dispatch!(level.token(), simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
             let duals = slopes.register(root);
-            for i in 0..count.points {
-                let at = start + i;
-                let [x, y, z] = &duals.gradient;
-                value[at] = if duals.value[i].is_nan() {
-                    f64::INFINITY
-                } else {
-                    duals.value[i]
-                };
-                gx[at] = if x[i].is_nan() { 0.0 } else { x[i] };
-                gy[at] = if y[i].is_nan() { 0.0 } else { y[i] };
-                gz[at] = if z[i].is_nan() { 0.0 } else { z[i] };
-            }
-            start += count.points;
+            let end = start + count.points;
+            let [x, y, z] = &duals.gradient;
+            numbers(&mut value[start..end], &duals.value, f64::INFINITY);
+            numbers(&mut gx[start..end], x, 0.0);
+            numbers(&mut gy[start..end], y, 0.0);
+            numbers(&mut gz[start..end], z, 0.0);
+            start = end;
         }
     }
 
@@ -194,12 +183,10 @@ impl Program {
             along.aim(direction, start);
             let count = dispatch!(level.token(), simd => along.run(simd, &self.code, points, start, noise_evaluations));
             let duals = along.register(root);
-            for i in 0..count.points {
-                let (v, s) = (duals.value[i], duals.gradient[0][i]);
-                value[start + i] = if v.is_nan() { f64::INFINITY } else { v };
-                slope[start + i] = if s.is_nan() { 0.0 } else { s };
-            }
-            start += count.points;
+            let end = start + count.points;
+            numbers(&mut value[start..end], &duals.value, f64::INFINITY);
+            numbers(&mut slope[start..end], &duals.gradient[0], 0.0);
+            start = end;
         }
     }
 
@@ -244,5 +231,12 @@ impl Program {
                 _ => 0,
             })
             .sum()
+    }
+}
+
+/// Copies lanes; `other` stands for what is not a number.
+fn numbers(out: &mut [f64], lanes: &Lanes, other: f64) {
+    for (out, value) in out.iter_mut().zip(lanes) {
+        *out = if value.is_nan() { other } else { *value };
     }
 }

@@ -13,6 +13,7 @@ use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
 use crate::grids;
 use crate::places::Places;
+use crate::sample::order::arrange;
 use crate::sample::spline::FILTER_ORDER_MAX;
 use crate::sample::strata::RAYS_MAX;
 use crate::sample::{Sample, Strata};
@@ -23,7 +24,7 @@ use crate::trace::{Goal, Hit, Ray, Surface, Tracer};
 use crate::view::{Sight, View};
 
 /// Samples that are worked on together, about: enough to fill batches, few enough for the cache.
-const TOGETHER: usize = 4096;
+const TOGETHER: usize = 8192;
 
 /// Rays towards the sun start this share of a footprint above the surface.
 const LIFT: f64 = 0.5;
@@ -53,6 +54,8 @@ pub struct ImageRenderer {
     sky: Sky,
     clouds: Option<Clouds>,
     shadows: bool,
+    /// Parts of the shutter whose samples are followed together.
+    slices: u32,
 }
 
 impl ImageRenderer {
@@ -92,6 +95,12 @@ impl ImageRenderer {
         let ground = mean_albedo(&description.surface.material);
         Ok(Self {
             strata: Strata::new(rays, order, description.key, image.0),
+            // Where nothing moves, all instants are one.
+            slices: if view.travel() > 0.0 || surface.moves {
+                rays
+            } else {
+                1
+            },
             sky: Sky::new(description, start, up, ground),
             clouds: Clouds::new(description, view.eye(), Interval::new(start, end))?,
             view,
@@ -125,8 +134,11 @@ impl ImageRenderer {
             for &(x, y) in places {
                 self.strata.of_pixel(x, y, &mut work.samples);
             }
+            let corner = [block.x0, block.y0];
+            arrange(&mut work.samples, corner, self.slices, &mut work.from);
             self.see(&mut work, cancel, &mut counts)?;
-            for seen in work.seen.chunks_exact(per_pixel) {
+            work.put_back();
+            for seen in work.in_order.chunks_exact(per_pixel) {
                 film.push(seen, &mut counts);
             }
         }
@@ -401,6 +413,8 @@ struct Touched {
 #[derive(Default)]
 struct Work {
     samples: Vec<Sample>,
+    /// From which place each of the samples comes.
+    from: Vec<u32>,
     sights: Vec<Sight>,
     rays: Vec<Ray>,
     hits: Vec<Hit>,
@@ -409,6 +423,8 @@ struct Work {
     /// Which of `touched` each shadow ray belongs to.
     asking: Vec<usize>,
     seen: Vec<Seen>,
+    /// The same, pixel by pixel.
+    in_order: Vec<Seen>,
     fields: Fields,
     scanned: Scanned,
     /// Which samples see the layer of clouds, and where.
@@ -417,6 +433,14 @@ struct Work {
 }
 
 impl Work {
+    /// Puts what the samples saw into the order of their pixels.
+    fn put_back(&mut self) {
+        self.in_order.clone_from(&self.seen);
+        for (seen, &place) in self.seen.iter().zip(&self.from) {
+            self.in_order[place as usize] = *seen;
+        }
+    }
+
     fn clear(&mut self) {
         self.samples.clear();
         self.sights.clear();

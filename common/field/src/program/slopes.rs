@@ -9,7 +9,8 @@ use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Octave, Term};
 use crate::lanes::{self, Cells, Lanes};
 use crate::noise::Lattice;
-use crate::number::Dual;
+use crate::number::{Dual, Number};
+use crate::op::Basis;
 use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
 use crate::program::machine::{self, Count};
@@ -46,6 +47,13 @@ impl<const N: usize> Duals<N> {
         self.value[i] = dual.value;
         for (lanes, part) in self.gradient.iter_mut().zip(dual.gradient) {
             lanes[i] = part;
+        }
+    }
+
+    fn clear(&mut self, n: usize) {
+        self.value[..n].fill(0.0);
+        for lanes in &mut self.gradient {
+            lanes[..n].fill(0.0);
         }
     }
 
@@ -419,8 +427,8 @@ impl<const N: usize> Octaves<N> {
             rest,
         } = self;
         machine::depths(cascade, n, footprint, &mut sample.depth);
-        total.set_constant(0.0);
-        rest.set_constant(0.0);
+        total.clear(n);
+        rest.clear(n);
         for (i, octave) in cascade.octaves.iter().enumerate() {
             let i = cascade::index(i);
             let live = machine::live(&sample.depth, count.points, i);
@@ -448,13 +456,29 @@ fn add<const N: usize>(
     rest: &mut Duals<N>,
 ) {
     match model {
-        Model::Sum(basis) => add_each(
+        Model::Sum(Basis::Plain) => add_each(
             at,
             sample,
             total,
             rest,
             #[inline(always)]
-            |t, n, c| cascade::sum(basis, t, n, c),
+            |t, n, c| cascade::sum(Basis::Plain, t, n, c),
+        ),
+        Model::Sum(Basis::Absolute) => add_each(
+            at,
+            sample,
+            total,
+            rest,
+            #[inline(always)]
+            |t, n, c| cascade::sum(Basis::Absolute, t, n, c),
+        ),
+        Model::Sum(Basis::Ridged) => add_each(
+            at,
+            sample,
+            total,
+            rest,
+            #[inline(always)]
+            |t, n, c| cascade::sum(Basis::Ridged, t, n, c),
         ),
         Model::AltitudeOne { basis, xi } => {
             add_each(
@@ -534,6 +558,19 @@ fn each<const N: usize>(
 }
 
 #[inline(always)]
+fn each2<const N: usize>(
+    n: usize,
+    [a, b]: [&Duals<N>; 2],
+    out: &mut Duals<N>,
+    f: impl Fn(Dual<N>, Dual<N>) -> Dual<N>,
+) {
+    assert!(n <= BATCH);
+    for i in 0..n {
+        out.set(i, f(a.at(i), b.at(i)));
+    }
+}
+
+#[inline(always)]
 fn each3<const N: usize>(
     n: usize,
     [a, b, c]: [&Duals<N>; 3],
@@ -546,18 +583,23 @@ fn each3<const N: usize>(
     }
 }
 
+/// One loop per function, so that none of them decides anything.
 #[inline(always)]
 fn unary_lanes<const N: usize>(unary: Unary, n: usize, a: &Duals<N>, out: &mut Duals<N>) {
-    each(
-        n,
-        a,
-        out,
-        #[inline(always)]
-        |a| {
-            let value = unary.value(a.value);
-            a.chain(value, unary.slope(a.value, value))
-        },
-    );
+    macro_rules! lanes {
+        ($($unary:ident)+) => {
+            match unary {
+                $(Unary::$unary => each(
+                    n,
+                    a,
+                    out,
+                    #[inline(always)]
+                    |a| a.unary(Unary::$unary),
+                ),)+
+            }
+        };
+    }
+    lanes!(Neg Abs Sqrt Sin Cos Exp);
 }
 
 #[inline(always)]
@@ -568,13 +610,18 @@ fn binary_lanes<const N: usize>(
     b: &Duals<N>,
     out: &mut Duals<N>,
 ) {
-    assert!(n <= BATCH);
-    for i in 0..n {
-        let (a, b) = (a.at(i), b.at(i));
-        let value = binary.value(a.value, b.value);
-        out.set(
-            i,
-            a.chain2(b, value, binary.slopes(a.value, b.value, value)),
-        );
+    macro_rules! lanes {
+        ($($binary:ident)+) => {
+            match binary {
+                $(Binary::$binary => each2(
+                    n,
+                    [a, b],
+                    out,
+                    #[inline(always)]
+                    |a, b| a.binary(b, Binary::$binary),
+                ),)+
+            }
+        };
     }
+    lanes!(Add Sub Mul Div Min Max);
 }

@@ -2,6 +2,7 @@
 //!
 //! Thesis §6.2 and §6.3. Nothing here knows what is sampled.
 
+pub(crate) mod order;
 pub(crate) mod spline;
 pub(crate) mod strata;
 

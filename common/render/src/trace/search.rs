@@ -229,13 +229,22 @@ impl Search {
             #[inline(always)]
             || batch.go(surface, n, paths, &rows.at),
         );
-        batch.evaluate_along(surface, n, paths, scratch);
+        if surface.tangents {
+            batch.evaluate_along(surface, n, paths, scratch);
+        } else {
+            batch.evaluate(surface, n, paths, scratch);
+            rows.chords(n, batch);
+        }
         for i in 0..n {
             let clearance = surface.clearances.at(batch.distance[i]);
             let pick = clearance.pick(batch.value[i]);
             (rows.offset[i], rows.slope[i]) = (pick.offset, pick.slope);
             let tangent = &clearance.tangent;
-            rows.tangent_offset[i] = tangent.offset;
+            rows.tangent_offset[i] = if surface.tangents {
+                tangent.offset
+            } else {
+                f64::INFINITY
+            };
             rows.tangent_slope[i] = tangent.slope;
             rows.curvature[i] = tangent.curvature;
             rows.reach[i] = clearance.reach;
@@ -256,6 +265,15 @@ impl Search {
 }
 
 impl Rows {
+    /// Takes the way from the last point outside for the derivative: it proves nothing, and foresees well enough.
+    fn chords(&self, n: usize, batch: &mut Batch) {
+        for i in 0..n {
+            let way = self.at[i] - self.outside[i];
+            let slope = (batch.value[i] - self.outside_value[i]) / way;
+            batch.slope[i] = if slope.is_finite() { slope } else { 0.0 };
+        }
+    }
+
     #[inline(always)]
     fn advance(&mut self, rays: &[Lane], known: Known, paths: &Paths, batch: &Batch) {
         assert!(rays.len() <= BATCH);

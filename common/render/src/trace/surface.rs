@@ -39,6 +39,8 @@ pub(crate) struct Surface {
     pub(crate) sight: Grid,
     /// Whether the field changes while the shutter is open.
     pub(crate) moves: bool,
+    /// Whether derivatives along rays are worth what they cost.
+    pub(crate) tangents: bool,
 }
 
 impl Surface {
@@ -82,6 +84,7 @@ impl Surface {
         };
         Ok(Self {
             moves: program.moves(),
+            tangents: clearances.gain_by_tangents(footprint),
             program,
             level,
             clearances,

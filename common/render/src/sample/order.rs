@@ -1,0 +1,94 @@
+//! In which order samples are followed: neighbours in the image and in time one after another.
+//!
+//! Rays next to each other share what they can (`trace::bundle`); nothing that they see depends on the order.
+
+use super::Sample;
+
+/// Cells along a pixel's side.
+const CELLS: f64 = 4.0;
+
+/// Cells to the left of the first and above it: filters reach beyond their pixels.
+const BEFORE: f64 = 1024.0;
+
+/// Puts samples in order and tells from which place each one comes.
+///
+/// They are sorted by one of `slices` equal parts of the shutter, then along a Morton curve over
+/// the image about `corner`, the least pixel of all.
+pub(crate) fn arrange(
+    samples: &mut Vec<Sample>,
+    corner: [u32; 2],
+    slices: u32,
+    from: &mut Vec<u32>,
+) {
+    let corner = corner.map(|part| f64::from(part) - BEFORE / CELLS);
+    let mut keys: Vec<(u64, u32)> = (0u32..)
+        .zip(samples.iter())
+        .map(|(index, sample)| {
+            let [x, y] = [0, 1].map(|axis| whole((sample.place[axis] - corner[axis]) * CELLS));
+            let slice = whole(sample.instant * f64::from(slices));
+            let curve = u64::from(spread(x) | spread(y) << 1);
+            (u64::from(slice) << 32 | curve, index)
+        })
+        .collect();
+    keys.sort_unstable();
+    from.clear();
+    from.extend(keys.iter().map(|&(_, index)| index));
+    *samples = from.iter().map(|&index| samples[index as usize]).collect();
+}
+
+/// The whole part, between 0 and 2¹⁶ − 1.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the cast saturates at both ends"
+)]
+fn whole(value: f64) -> u32 {
+    u32::from(value as u16)
+}
+
+/// The sixteen low bits, each with a zero before it.
+fn spread(bits: u32) -> u32 {
+    let mut x = bits & 0xffff;
+    x = (x | x << 8) & 0x00ff_00ff;
+    x = (x | x << 4) & 0x0f0f_0f0f;
+    x = (x | x << 2) & 0x3333_3333;
+    (x | x << 1) & 0x5555_5555
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn neighbours_follow_each_other_and_nothing_is_lost() {
+        let mut samples: Vec<Sample> = (0..4096u32)
+            .map(|i| Sample {
+                place: [f64::from(i % 32) + 640.5, f64::from(i / 32 % 32) + 320.5],
+                instant: f64::from(i / 1024) / 4.0 + 0.1,
+            })
+            .collect();
+        let before = samples.clone();
+        let mut from = Vec::new();
+        arrange(&mut samples, [640, 320], 4, &mut from);
+        let mut seen = vec![false; before.len()];
+        for (sample, &index) in samples.iter().zip(&from) {
+            assert_eq!(*sample, before[index as usize]);
+            seen[index as usize] = true;
+        }
+        assert!(seen.iter().all(|seen| *seen));
+        for patch in samples.chunks(64) {
+            for axis in 0..2 {
+                let along = patch.iter().map(|sample| sample.place[axis]);
+                let (low, high) = along.fold((f64::INFINITY, 0.0f64), |(low, high), x| {
+                    (low.min(x), high.max(x))
+                });
+                assert_eq!(high - low, 7.0, "{patch:?}");
+            }
+            assert!(
+                patch
+                    .iter()
+                    .all(|sample| sample.instant == patch[0].instant)
+            );
+        }
+    }
+}
