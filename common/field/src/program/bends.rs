@@ -146,7 +146,7 @@ fn bend(step: &Step, around: &Surroundings, bounds: &[Bound], bends: &[Interval]
             of_noise(a.slope, size(0)).bend
         }
         Act::Cascade(cascade) => of_cascade(cascade, around, number(0).slope, size(0)).bend,
-        Act::Curve(_) | Act::Select => Interval::ALL,
+        Act::Curve(_) | Act::Select | Act::Shape(_) | Act::Grid(_) => Interval::ALL,
     }
 }
 

@@ -26,7 +26,7 @@ impl Local for f64 {
     }
 }
 
-impl Local for Dual {
+impl<const N: usize> Local for Dual<N> {
     #[inline(always)]
     fn at(&self) -> f64 {
         self.value
