@@ -29,6 +29,9 @@ pub(crate) struct Options {
     runs: u32,
 }
 
+/// Renders the peer's side once and tells the seconds.
+type Turn<'a> = Box<dyn Fn() -> Result<f64, Error> + 'a>;
+
 fn rows() -> PossibleValuesParser {
     ROWS.iter()
         .map(|row| PossibleValue::new(row.name))
@@ -65,7 +68,7 @@ pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error>
                 continue;
             }
         };
-        let peer: (&str, Box<dyn Fn() -> Result<f64, Error>>) = match row.peer {
+        let peer: (&str, Turn<'_>) = match row.peer {
             Peer::Absent(program) => {
                 skip(format!("needs {program}, which is not here"));
                 continue;
