@@ -3,7 +3,7 @@
 //! A grid's coordinates count samples: sample (i, j, k) stands at the place (i, j, k). A field puts it where
 //! it belongs in the world by scaling and moving its argument. Grids of one layer are functions of x and y alone.
 //!
-//! [`Samples`] are what a file holds or a recipe ([`recipe`]) synthesises; a [`Surface`] interpolates them by
+//! [`Samples`] are what a file holds or a recipe synthesises; a [`Surface`] interpolates them by
 //! tensor-product B-splines of degree 1 to 3 *through* the samples, with gradient, Hessian, and bounds of both over
 //! boxes. Samples are f32, everything computed from them is f64, at every SIMD level by the same code.
 
