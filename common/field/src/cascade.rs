@@ -13,7 +13,7 @@
 
 use crate::arithmetic::clamp01;
 use crate::hash;
-use crate::noise::Lattice;
+use crate::noise::{self, Lattice, Noise};
 use crate::number::Number;
 use crate::op::{Basis, Op};
 
@@ -34,9 +34,13 @@ pub(crate) enum Model {
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Octave {
     pub(crate) lattice: Lattice,
+    /// The key of its lattice.
+    key: u32,
+    /// The noise, unless it is gradient noise over that lattice.
+    pub(crate) noise: Option<Noise>,
     /// rⁱ.
     pub(crate) frequency: f64,
-    /// rⁱ Rⁱ⁺¹, by rows.
+    /// rⁱ Rⁱ⁺¹, by rows; skewed, as `shift` is, where the noise is.
     pub(crate) matrix: [[f64; 3]; 3],
     /// oᵢ.
     pub(crate) shift: [f64; 3],
@@ -53,6 +57,8 @@ pub(crate) struct Detail {
     pub(crate) detail: f64,
     /// 1/log₂ r.
     pub(crate) per_octave: f64,
+    /// The number of the cascade's first octave.
+    pub(crate) first: f64,
 }
 
 /// A cascade of octaves.
@@ -67,6 +73,9 @@ pub(crate) struct Cascade {
 impl Cascade {
     /// The cascade of a node with these constants, whose argument has `scale` lattice cells per metre, 0 if that is unknown.
     pub(crate) fn new(op: Op, params: &[f64], scale: f64) -> Option<Self> {
+        if op == Op::Cascade {
+            return Self::over_noise(params, scale);
+        }
         let (model, key, lacunarity, hurst, octaves, detail) = match (op, params) {
             (Op::RidgedMultifractal, &[key, r, h, octaves, offset, gain, detail]) => {
                 (Model::Ridged { offset, gain }, key, r, h, octaves, detail)
@@ -83,16 +92,59 @@ impl Cascade {
             }
             _ => return None,
         };
-        let detail = (detail > 0.0 && scale > 0.0).then(|| Detail {
-            scale,
-            detail,
-            per_octave: 1.0 / libm::log2(lacunarity),
-        });
-        let octaves = octaves_of(key, lacunarity, hurst, octaves);
+        let octaves = octaves_of(key, lacunarity, &Amplitudes::Even(hurst), octaves);
         Some(Self {
             model,
             octaves,
+            detail: detail_of(detail, scale, lacunarity, 0.0),
+        })
+    }
+
+    /// The cascade over any noise whose constants [`Op::Cascade`] describes.
+    fn over_noise(params: &[f64], scale: f64) -> Option<Self> {
+        let [
+            model,
+            basis,
+            key,
+            lacunarity,
+            hurst,
+            octaves,
+            xi,
             detail,
+            offset,
+            gain,
+            first,
+            ..,
+        ] = *params
+        else {
+            return None;
+        };
+        let (op, constants, hursts) = noise::limits::split_noise(params, 11)?;
+        let basis = Basis::from_number(basis)?;
+        let model = match model {
+            0.0 => Model::Sum(basis),
+            1.0 => Model::AltitudeOne { basis, xi },
+            2.0 => Model::AltitudeTwo { basis, xi },
+            _ => Model::Ridged { offset, gain },
+        };
+        let amplitudes = if hursts.is_empty() {
+            Amplitudes::Even(hurst)
+        } else {
+            Amplitudes::Each(first, hursts)
+        };
+        let mut list = octaves_of(key, lacunarity, &amplitudes, first + octaves);
+        list.drain(..noise::kind::whole(first) as usize);
+        // Gradient noise keeps its fast loops.
+        if op != Op::Noise {
+            let noise = Noise::new(op, constants)?;
+            for octave in &mut list {
+                octave.take(&noise);
+            }
+        }
+        Some(Self {
+            model,
+            octaves: list,
+            detail: detail_of(detail, scale, lacunarity, first),
         })
     }
 
@@ -104,7 +156,8 @@ impl Cascade {
                 scale,
                 detail,
                 per_octave,
-            }) => 1.0 - (log2(footprint * scale) + detail) * per_octave,
+                first,
+            }) => 1.0 - (log2(footprint * scale) + detail) * per_octave - first,
             None => f64::INFINITY,
         }
     }
@@ -237,6 +290,17 @@ pub(crate) fn index(i: usize) -> f64 {
 }
 
 impl Octave {
+    /// Makes it an octave of another noise.
+    fn take(&mut self, noise: &Noise) {
+        let noise = noise.keyed(self.key);
+        if noise.is_skewed() {
+            let columns = [0, 1, 2].map(|j| noise::simplex::skew(self.matrix.map(|row| row[j])));
+            self.matrix = [0, 1, 2].map(|i| columns.map(|column| column[i]));
+            self.shift = noise::simplex::skew(self.shift);
+        }
+        self.noise = Some(noise);
+    }
+
     /// Where the octave looks when the cascade is asked at `a`.
     #[inline(always)]
     pub(crate) fn place(&self, [x, y, z]: [f64; 3]) -> [f64; 3] {
@@ -260,7 +324,40 @@ pub(crate) fn pull([a, b, c]: &[[f64; 3]; 3], [x, y, z]: [f64; 3]) -> [f64; 3] {
     ]
 }
 
-fn octaves_of(key: f64, lacunarity: f64, hurst: f64, octaves: f64) -> Vec<Octave> {
+/// The level of detail of a cascade, `None` if it has none.
+fn detail_of(detail: f64, scale: f64, lacunarity: f64, first: f64) -> Option<Detail> {
+    (detail > 0.0 && scale > 0.0).then(|| Detail {
+        scale,
+        detail,
+        per_octave: 1.0 / libm::log2(lacunarity),
+        first,
+    })
+}
+
+/// The Hurst coefficients of a cascade.
+enum Amplitudes<'a> {
+    /// H of every octave.
+    Even(f64),
+    /// Hᵢ (thesis §3.3.3), from the octave of that number on.
+    Each(f64, &'a [f64]),
+}
+
+impl Amplitudes<'_> {
+    /// H of octave `i`.
+    fn hurst(&self, i: u32) -> f64 {
+        match self {
+            Self::Even(hurst) => *hurst,
+            Self::Each(first, list) => {
+                let at = i.checked_sub(noise::kind::whole(*first));
+                at.and_then(|at| list.get(at as usize))
+                    .copied()
+                    .unwrap_or(0.0)
+            }
+        }
+    }
+}
+
+fn octaves_of(key: f64, lacunarity: f64, amplitudes: &Amplitudes<'_>, octaves: f64) -> Vec<Octave> {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -275,10 +372,12 @@ fn octaves_of(key: f64, lacunarity: f64, hurst: f64, octaves: f64) -> Vec<Octave
         let key = hash::hash(&[key, i]);
         list.push(Octave {
             lattice: Lattice::new(key),
+            noise: None,
+            key,
             frequency,
             matrix: turn.map(|row| row.map(|entry| entry * frequency)),
             shift: [0, 1, 2].map(|axis| hash::unit(hash::hash(&[key, axis]))),
-            amplitude: libm::pow(lacunarity, -hurst * f64::from(i)),
+            amplitude: libm::pow(lacunarity, -amplitudes.hurst(i) * f64::from(i)),
         });
         turn = product(step, turn);
         frequency *= lacunarity;
@@ -366,7 +465,7 @@ mod tests {
 
     #[test]
     fn octaves_turn_without_stretching() {
-        for octave in octaves_of(7.0, 2.0, 1.0, 48.0) {
+        for octave in octaves_of(7.0, 2.0, &Amplitudes::Even(1.0), 48.0) {
             for i in 0..3 {
                 for j in 0..3 {
                     let dot: f64 = (0..3)

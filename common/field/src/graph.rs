@@ -7,6 +7,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::sync::Arc;
 
 use crate::grid::{Samples, recipe};
+use crate::noise::{self, limits};
 use crate::op::{Basis, Kind, Op, Params};
 use crate::shape::Shape;
 
@@ -24,6 +25,9 @@ pub const KEYS_MAX: usize = 4_096;
 
 /// Most numbers of a shape's list.
 pub const LIST_MAX: usize = 8_192;
+
+/// Most constants after the named ones of an operation over a noise: the noise's own, and a Hurst coefficient per octave.
+const NOISE_CONSTANTS_MAX: usize = 16 + 48;
 
 /// A node of one graph. Its arguments have smaller ids than it.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Debug)]
@@ -177,6 +181,10 @@ impl Graph {
                 .all(|(arg, &kind)| arg.index() < self.nodes.len() && self.kind(*arg) == kind);
         let counted = match signature.params {
             Params::Named(names) => params.len() == names.len(),
+            Params::OverNoise(names) => {
+                params.len() <= names.len() + NOISE_CONSTANTS_MAX
+                    && limits::split_noise(params, names.len()).is_some()
+            }
             Params::Keys => {
                 !params.is_empty() && params.len().is_multiple_of(2) && params.len() <= 2 * KEYS_MAX
             }
@@ -204,7 +212,7 @@ fn check_ranges(op: Op, params: &[f64]) -> Result<(), GraphError> {
     if let Some(Err((wanted, value))) = Shape::new(op, params) {
         return refuse(wanted, value);
     }
-    let Params::Named(names) = signature.params else {
+    let (Params::Named(names) | Params::OverNoise(names)) = signature.params else {
         if signature.params == Params::List {
             return Ok(());
         }
@@ -249,8 +257,52 @@ fn check_ranges(op: Op, params: &[f64]) -> Result<(), GraphError> {
         Op::SmoothStep if params[0] >= params[1] => {
             refuse("its first edge below its second", params[0])
         }
+        Op::Cascade | Op::NoiseGradient => match over_noise(op, names, params) {
+            Some((wanted, value)) => refuse(wanted, value),
+            None => Ok(()),
+        },
+        op if limits::is_noise(op) => match limits::refused(op, params) {
+            Some((wanted, value)) => refuse(wanted, value),
+            None => Ok(()),
+        },
         _ => Ok(()),
     }
+}
+
+/// What is wrong with the constants of an operation over a noise.
+fn over_noise(op: Op, names: &[&str], params: &[f64]) -> Option<limits::Refused> {
+    let (inner, constants, after) = limits::split_noise(params, names.len())?;
+    if let Some(refused) = limits::refused(inner, constants) {
+        return Some(refused);
+    }
+    let named = |name: &str| {
+        let at = names.iter().position(|known| *known == name);
+        at.map_or(0.0, |at| params[at])
+    };
+    if op == Op::NoiseGradient {
+        let smooth = noise::Noise::new(inner, constants).is_some_and(|n| n.bend().is_finite());
+        return match after {
+            _ if !smooth => Some(("a noise whose gradient is continuous", params[0])),
+            [first, ..] => Some(("nothing after the noise", *first)),
+            [] => None,
+        };
+    }
+    let (octaves, first, model) = (named("octaves"), named("first"), named("model"));
+    if !matches!(model, 0.0 | 1.0 | 2.0 | 3.0) {
+        return Some(("a model from 0 to 3", model));
+    }
+    if !(0.0..OCTAVES_MAX).contains(&first) || first % 1.0 != 0.0 || first + octaves > OCTAVES_MAX {
+        return Some(("octaves that end at the 48th", first));
+    }
+    #[expect(clippy::cast_precision_loss, reason = "it is at most 64")]
+    let count = after.len() as f64;
+    if count != 0.0 && count != octaves {
+        return Some(("one Hurst coefficient for each octave", count));
+    }
+    after
+        .iter()
+        .find(|hurst| !(-4.0..=4.0).contains(*hurst))
+        .map(|hurst| ("a Hurst coefficient from -4 to 4", *hurst))
 }
 
 #[cfg(test)]

@@ -51,8 +51,16 @@ impl Cells {
         [a[i], b[i], c[i], d[i], e[i], f[i], g[i], h[i]]
     }
 
+    /// The cell of a lane.
     #[inline(always)]
-    fn offset_at(&self, i: usize) -> [f32; 3] {
+    pub(crate) fn cell_at(&self, i: usize) -> [u32; 3] {
+        let [x, y, z] = &self.cell;
+        [x[i], y[i], z[i]]
+    }
+
+    /// The offset of a lane within its cell.
+    #[inline(always)]
+    pub(crate) fn offset_at(&self, i: usize) -> [f32; 3] {
         let [x, y, z] = &self.offset;
         [x[i], y[i], z[i]]
     }

@@ -51,6 +51,8 @@ pub enum Params {
     Keys,
     /// A list of numbers, as long as the operation wants it.
     List,
+    /// These, by name, then a noise: its opcode and its constants. Then a Hurst coefficient for each octave, or none.
+    OverNoise(&'static [&'static str]),
 }
 
 /// What an operation takes and gives.
@@ -181,6 +183,26 @@ ops! {
     RidgedMultifractal = 68 "ridged_multifractal" (Vector) Params::Named(&[
         "key", "lacunarity", "hurst", "octaves", "offset", "gain", "detail",
     ]) => Scalar;
+
+    /// Value noise at a, thesis eq. (4.11), over the lattice of `key`.
+    ValueNoise = 80 "value_noise" (Vector) Params::Named(&["key"]) => Scalar;
+    /// Value-gradient noise at a, thesis eq. (4.12).
+    ValueGradientNoise = 81 "value_gradient_noise" (Vector) Params::Named(&["key"]) => Scalar;
+    /// Simplex noise at a, thesis §4.3.2.
+    SimplexNoise = 82 "simplex" (Vector) Params::Named(&["key"]) => Scalar;
+    /// Sparse convolution noise at a, thesis eq. (4.13): `nodes` per cell, `kernel` and `scatter` by their numbers.
+    SparseNoise = 83 "sparse" (Vector) Params::Named(&["key", "nodes", "kernel", "scatter"]) => Scalar;
+    /// Cellular noise at a, thesis eqs. (4.18), (4.20): Σ a_l (ψ(φ_l) − μ_l), `norm` 0 for the maximum norm.
+    CellularNoise = 84 "cellular" (Vector) Params::Named(&[
+        "key", "norm", "density", "a1", "a2", "a3", "a4", "squared", "unbiased",
+    ]) => Scalar;
+    /// A cascade as 65 to 68 (`model` 0 to 3 in their order) over any noise, from octave `first` on;
+    /// after the noise a Hurst coefficient for each octave, or none.
+    Cascade = 88 "cascade" (Vector) Params::OverNoise(&[
+        "model", "basis", "key", "lacunarity", "hurst", "octaves", "xi", "detail", "offset", "gain", "first",
+    ]) => Scalar;
+    /// The gradient of a smooth noise at a, thesis eq. (4.2).
+    NoiseGradient = 89 "noise_gradient" (Vector) Params::OverNoise(&[]) => Vector;
 
     /// An algebraic surface, thesis §2.2.2: terms (i, j, k, c) of Σ c xⁱ yʲ zᵏ.
     Polynomial = 128 "polynomial" (Vector) Params::List => Scalar;

@@ -226,7 +226,7 @@ impl Program {
             .instructions
             .iter()
             .map(|instruction| match &instruction.act {
-                Operation::Noise(_) => 1,
+                Operation::Noise(_) | Operation::AnyNoise(_) | Operation::Slope(..) => 1,
                 Operation::Cascade(cascade) => cascade.count(footprint),
                 _ => 0,
             })

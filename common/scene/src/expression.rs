@@ -10,12 +10,14 @@ mod cascades;
 mod grids;
 mod language;
 mod make;
+pub(crate) mod noises;
 mod options;
 mod refusal;
 mod shapes;
 mod skeletons;
 mod solids;
 mod values;
+mod weierstrass;
 
 use std::cell::RefCell;
 use std::collections::{BTreeMap, BTreeSet};

@@ -17,6 +17,8 @@ pub fn schema() -> Value {
         json!("https://json-schema.org/draft/2020-12/schema"),
     );
     entries.insert("title".into(), json!("Flyby scene"));
+    // Not a keyword of the standard: validators pass over it, people and editors can read it.
+    entries.insert("x-noises".into(), crate::expression::noises::described());
     schema
 }
 
@@ -174,5 +176,9 @@ mod tests {
             25
         );
         assert_eq!(schema["required"], json!(["camera", "surface"]));
+        assert_eq!(
+            schema["x-noises"]["cellular"]["options"]["density"]["default"],
+            "2"
+        );
     }
 }

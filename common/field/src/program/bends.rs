@@ -145,7 +145,10 @@ fn bend(step: &Step, around: &Surroundings, bounds: &[Bound], bends: &[Interval]
             let a = number(0);
             of_noise(a.slope, size(0)).bend
         }
+        Act::Cascade(cascade) if cascade.octaves.iter().any(|o| o.noise.is_some()) => Interval::ALL,
         Act::Cascade(cascade) => of_cascade(cascade, around, number(0).slope, size(0)).bend,
+        // The derivatives of other noises are rounded to more than tangents allow for.
+        Act::AnyNoise(_) | Act::NoiseGradient(_) => Interval::ALL,
         Act::Curve(_) | Act::Select | Act::Shape(_) | Act::Grid(_) => Interval::ALL,
     }
 }

@@ -1,7 +1,7 @@
 //! Ranges and moduli against what evaluation gives: no pair of places may break any level.
 
 use crate::hash::{hash, unit};
-use crate::program::tests::{fig_5_6, planet, scaled, values, zoo};
+use crate::program::tests::{fig_5_6, noise_zoo, planet, scaled, values, zoo};
 use crate::{
     Graph, Interval, NodeId, Op, Points, Program, Region, Scratch, SimdLevel, Surroundings,
 };
@@ -193,7 +193,7 @@ fn no_pair_in_a_box_breaks_a_bound() {
     let pairs = Pairs::new(region, [0.5, 0.5, 6.0], 3.0, 20_000, |[x, y, z]| {
         [3.0 * x, 1.5 * y - 0.5, 1.375 + 1.125 * z]
     });
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         pairs.check(&name, &program);
     }
 }
@@ -209,7 +209,7 @@ fn no_pair_in_a_shell_breaks_a_bound() {
         let radius = 0.5001 + 1.4998 * (x * 1e3).rem_euclid(1.0);
         [x, y, z].map(|part| part / length * radius)
     });
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         pairs.check(&name, &program);
     }
 }

@@ -14,7 +14,7 @@ use crate::cascade::{self, Cascade, Model, Octave};
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::{Interval, larger, smaller};
-use crate::noise;
+use crate::noise::{self, Noise};
 use crate::op::Basis;
 use crate::program::fold;
 use crate::program::plan::{Act, Plan, Step};
@@ -267,6 +267,19 @@ impl<'a> Pass<'a> {
                 let change = self.noise(arg(0).change());
                 self.scalar(NOISE, change)
             }
+            Act::AnyNoise(noise) => {
+                let at = skewed(noise, arg(0), 4.0);
+                let change = self.any_noise(noise, at);
+                self.scalar(noise.range(), change)
+            }
+            Act::NoiseGradient(noise) => {
+                let change = skewed(noise, arg(0), 4.0).times(noise.bend());
+                let slope = noise.slope() + noise.slope_rounding();
+                let change = change.plus(Change::new(2.0 * noise.slope_rounding(), 0.0));
+                let norm = Interval::new(0.0, slope).widen();
+                let change = self.closer(change, Change::new(2.0 * slope, 0.0));
+                vector([Interval::new(-slope, slope).widen(); 3], norm, change)
+            }
             Act::Cascade(cascade) => self.cascade(cascade, arg(0)),
             Act::Shape(shape) => match step.args[..] {
                 [_, _] => {
@@ -489,6 +502,15 @@ impl<'a> Pass<'a> {
         self.limited(NOISE, change)
     }
 
+    /// The change of any other noise where its argument changes so.
+    fn any_noise(&mut self, noise: &Noise, at: Change) -> Change {
+        let at = at.plus(Change::new(OFFSET_ROUNDING, 0.0));
+        let change = at
+            .times(noise.slope())
+            .plus(Change::new(2.0 * noise.rounding(), 0.0));
+        self.limited(noise.range(), change)
+    }
+
     fn cascade(&mut self, cascade: &Cascade, at: &Bound) -> Bound {
         let zero = Interval::point(0.0);
         let mut total = Part {
@@ -502,7 +524,7 @@ impl<'a> Pass<'a> {
                 break;
             }
             let noise = Part {
-                range: NOISE,
+                range: octave.noise.as_ref().map_or(NOISE, Noise::range),
                 change: self.octave(octave, at),
             };
             let amplitude = octave.amplitude;
@@ -555,7 +577,15 @@ impl<'a> Pass<'a> {
             .change()
             .times(frequency)
             .rounded(at.magnitude() * frequency + 1.0, 8.0);
-        self.noise(place)
+        match &octave.noise {
+            None => self.noise(place),
+            // Skewing at most doubles the coordinates, and their rounding.
+            Some(noise) if noise.is_skewed() => {
+                let more = at.magnitude() * frequency * 2.0 + 2.0;
+                self.any_noise(noise, place.rounded(more, 8.0))
+            }
+            Some(noise) => self.any_noise(noise, place),
+        }
     }
 
     /// The level-of-detail weight of octave `i`. It changes with the footprint, where it is neither 0 nor 1.
@@ -577,7 +607,9 @@ impl<'a> Pass<'a> {
             };
         }
         // Below this footprint the weight is 1.
-        let full = libm::exp2(-detail.detail - i / detail.per_octave) / detail.scale * (1.0 - 1e-9);
+        let full = libm::exp2(-detail.detail - (i + detail.first) / detail.per_octave)
+            / detail.scale
+            * (1.0 - 1e-9);
         let per_metre = detail.per_octave / (std::f64::consts::LN_2 * larger(low, full));
         let change = Change::new(slack, self.around.footprint_slope * per_metre);
         Part {
@@ -615,6 +647,16 @@ impl<'a> Pass<'a> {
             range,
             change: self.limited(range, change),
         }
+    }
+}
+
+/// The change of the argument of a noise, the rounding of its skewing included.
+fn skewed(noise: &Noise, at: &Bound, operations: f64) -> Change {
+    let change = at.change();
+    if noise.is_skewed() {
+        change.rounded(2.0 * at.magnitude(), operations)
+    } else {
+        change
     }
 }
 

@@ -7,7 +7,7 @@ use crate::arithmetic::{Binary, Unary};
 use crate::cascade::Cascade;
 use crate::curve::Curve;
 use crate::grid::Surface;
-use crate::noise::Lattice;
+use crate::noise::{Lattice, Noise, simplex};
 use crate::op::Kind;
 use crate::program::CompileError;
 use crate::program::plan::{Act, Plan, Step};
@@ -34,6 +34,10 @@ pub(crate) enum Operation {
     /// radius/‖v‖ from ‖v‖.
     OntoSphere(f64),
     Noise(Lattice),
+    /// By skewed coordinates if the noise is skewed.
+    AnyNoise(Noise),
+    /// The component of the noise's gradient along that axis, by skewed coordinates if it is skewed.
+    Slope(Noise, usize),
     Cascade(Cascade),
     Shape(Arc<Shape>),
     Grid(Arc<Surface>),
@@ -151,6 +155,17 @@ impl Lowering {
             Act::Noise(lattice) => {
                 return Place::Scalar(self.push(Operation::Noise(*lattice), &v(0)));
             }
+            Act::AnyNoise(noise) => {
+                let at = self.skewed(noise, v(0));
+                return Place::Scalar(self.push(Operation::AnyNoise(noise.clone()), &at));
+            }
+            Act::NoiseGradient(noise) => {
+                let at = self.skewed(noise, v(0));
+                let slopes =
+                    [0, 1, 2].map(|axis| self.push(Operation::Slope(noise.clone(), axis), &at));
+                // The skewing is symmetric: it is its own transpose.
+                return Place::Vector(self.skewed(noise, slopes));
+            }
             Act::Cascade(cascade) => {
                 return Place::Scalar(self.push(Operation::Cascade(cascade.clone()), &v(0)));
             }
@@ -188,6 +203,19 @@ impl Lowering {
     fn push(&mut self, act: Operation, args: &[Slot]) -> Slot {
         self.instructions.push((act, args.to_vec()));
         Slot::Result(self.instructions.len() - 1)
+    }
+
+    /// The coordinates that a noise is a function of, as `simplex::skew` computes them.
+    fn skewed(&mut self, noise: &Noise, [x, y, z]: [Slot; 3]) -> [Slot; 3] {
+        if !noise.is_skewed() {
+            return [x, y, z];
+        }
+        let add = Operation::Binary(Binary::Add);
+        let xy = self.push(add.clone(), &[x, y]);
+        let sum = self.push(add.clone(), &[xy, z]);
+        let factor = self.constant(simplex::SKEW);
+        let s = self.push(Operation::Binary(Binary::Mul), &[sum, factor]);
+        [x, y, z].map(|part| self.push(add.clone(), &[part, s]))
     }
 
     fn parts(&mut self, binary: Binary, a: [Slot; 3], b: [Slot; 3]) -> Place {

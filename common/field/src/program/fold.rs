@@ -62,6 +62,8 @@ pub(crate) fn constant(act: &Act, args: &[Option<Value>]) -> Option<Value> {
             _ => v(0),
         })),
         Act::Grid(surface) => Value::Scalar(surface.value(v(0))),
+        Act::AnyNoise(noise) => Value::Scalar(noise.value_at(v(0))),
+        Act::NoiseGradient(noise) => Value::Vector(noise.gradient_at(v(0))),
         Act::Noise(lattice) => {
             let [(x, u), (y, v), (z, w)] = v(0).map(noise::split);
             Value::Scalar(f64::from(noise::value(

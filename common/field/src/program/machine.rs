@@ -8,6 +8,7 @@ use fearless_simd::Simd;
 use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Term};
 use crate::lanes::{self, Cells, Lanes};
+use crate::noise::batch;
 use crate::op::Basis;
 use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
@@ -197,6 +198,20 @@ impl Machine {
                 }
                 return count.points as u64;
             }
+            Operation::AnyNoise(any) => {
+                let Octaves { cells, noise, .. } = &mut *self.octaves;
+                lanes::split(simd, n, [a, b, c], cells);
+                batch::values(simd, n, any, cells, noise);
+                widen(n, noise, out);
+                return count.points as u64;
+            }
+            Operation::Slope(any, axis) => {
+                let Octaves { cells, noise, .. } = &mut *self.octaves;
+                lanes::split(simd, n, [a, b, c], cells);
+                batch::slopes(n, any, *axis, cells, noise);
+                widen(n, noise, out);
+                return count.points as u64;
+            }
             Operation::Cascade(cascade) => {
                 let footprint = &*self.registers[FOOTPRINT];
                 return self
@@ -205,6 +220,14 @@ impl Machine {
             }
         }
         0
+    }
+}
+
+/// A noise's values as the registers hold them.
+#[inline(always)]
+fn widen(n: usize, noise: &[f32; BATCH], out: &mut Lanes) {
+    for (out, noise) in out[..n].iter_mut().zip(&noise[..n]) {
+        *out = f64::from(*noise);
     }
 }
 
@@ -258,7 +281,10 @@ impl Octaves {
             }
             noises += live;
             lanes::place(simd, n, octave, at, &mut self.cells);
-            lanes::values(simd, n, octave.lattice, &mut self.cells, &mut self.noise);
+            match &octave.noise {
+                None => lanes::values(simd, n, octave.lattice, &mut self.cells, &mut self.noise),
+                Some(any) => batch::values(simd, n, any, &self.cells, &mut self.noise),
+            }
             let place = Place {
                 n,
                 i: cascade::index(i),

@@ -8,7 +8,7 @@ use crate::curve::{Curve, Join};
 use crate::graph::Node;
 use crate::grid::{SAMPLES_MAX, Surface, recipe};
 use crate::interval::{Interval, larger};
-use crate::noise::Lattice;
+use crate::noise::{Lattice, Noise, limits};
 use crate::op::{Kind, Op};
 use crate::program::CompileError;
 use crate::program::fold::{self, Value};
@@ -39,6 +39,10 @@ pub(crate) enum Act {
     SmoothStep(f64, f64),
     Select,
     Noise(Lattice),
+    /// Any noise but the gradient noise above.
+    AnyNoise(Noise),
+    /// The gradient of a noise.
+    NoiseGradient(Noise),
     Cascade(Cascade),
     Shape(Arc<Shape>),
     Grid(Arc<Surface>),
@@ -224,7 +228,20 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
             let key = params[0] as u32;
             Act::Noise(Lattice::new(key))
         }
-        Op::Sum | Op::AltitudeOne | Op::AltitudeTwo | Op::RidgedMultifractal => {
+        Op::ValueNoise
+        | Op::ValueGradientNoise
+        | Op::SimplexNoise
+        | Op::SparseNoise
+        | Op::CellularNoise => {
+            let noise = Noise::new(node.op, params);
+            Act::AnyNoise(noise.expect("the graph checked the constants"))
+        }
+        Op::NoiseGradient => {
+            let noise = limits::split_noise(params, 0)
+                .and_then(|(op, constants, _)| Noise::new(op, constants));
+            Act::NoiseGradient(noise.expect("the graph checked the constants"))
+        }
+        Op::Sum | Op::AltitudeOne | Op::AltitudeTwo | Op::RidgedMultifractal | Op::Cascade => {
             let cascade = Cascade::new(node.op, params, args[0].scale);
             Act::Cascade(cascade.expect("the graph checked the constants"))
         }

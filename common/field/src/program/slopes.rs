@@ -8,7 +8,7 @@ use fearless_simd::Simd;
 use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Octave, Term};
 use crate::lanes::{self, Cells, Lanes};
-use crate::noise::Lattice;
+use crate::noise::{Lattice, batch};
 use crate::number::{Dual, Number};
 use crate::op::Basis;
 use crate::points::{BATCH, Points};
@@ -80,6 +80,8 @@ struct Octaves<const N: usize> {
     cells: Cells,
     /// Directions in the octave's lattice; of use where `N` is 1.
     along: [[f32; BATCH]; 3],
+    /// All three derivatives of a noise that is not asked along a direction itself.
+    full: [[f32; BATCH]; 3],
     sample: Sample<N>,
     total: Box<Duals<N>>,
     rest: Box<Duals<N>>,
@@ -110,6 +112,7 @@ impl<const N: usize> Default for Slopes<N> {
             octaves: Box::new(Octaves {
                 cells: Cells::new(),
                 along: [[0.0; BATCH]; 3],
+                full: [[0.0; BATCH]; 3],
                 sample: Sample {
                     noise: [0.0; BATCH],
                     gradient: [[0.0; BATCH]; N],
@@ -285,6 +288,31 @@ impl<const N: usize> Slopes<N> {
                 }
                 return count.points as u64;
             }
+            Operation::AnyNoise(_) | Operation::Slope(..) => {
+                let Octaves {
+                    cells,
+                    full: gradient,
+                    sample: Sample { noise, .. },
+                    ..
+                } = &mut *self.octaves;
+                lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
+                match &instruction.act {
+                    Operation::Slope(any, axis) => {
+                        batch::slopes_gradients(n, any, *axis, cells, noise, gradient);
+                    }
+                    Operation::AnyNoise(any) => {
+                        batch::values_gradients(simd, n, any, cells, noise, gradient);
+                    }
+                    _ => unreachable!("the arm takes no other"),
+                }
+                let [gx, gy, gz] = gradient;
+                for i in 0..n {
+                    let slopes = [f64::from(gx[i]), f64::from(gy[i]), f64::from(gz[i])];
+                    let at = [a.at(i), b.at(i), c.at(i)];
+                    out.set(i, pull(slopes, at, f64::from(noise[i])));
+                }
+                return count.points as u64;
+            }
             Operation::Cascade(cascade) => {
                 let footprint = &self.registers[FOOTPRINT].value;
                 let noises = self.octaves.run(simd, cascade, count, [a, b, c], footprint);
@@ -365,6 +393,24 @@ impl<const N: usize> Sample<N> {
         }
     }
 
+    /// Takes a noise's gradient, or its derivative along `along`.
+    #[inline(always)]
+    fn take(&mut self, n: usize, [x, y, z]: &[[f32; BATCH]; 3], along: &[[f32; BATCH]; 3]) {
+        let [p, q, r] = along;
+        match self.gradient.as_mut_slice() {
+            [slope] => {
+                for (i, slope) in slope[..n].iter_mut().enumerate() {
+                    *slope = x[i] * p[i] + y[i] * q[i] + z[i] * r[i];
+                }
+            }
+            parts => {
+                for (part, given) in parts.iter_mut().zip([x, y, z]) {
+                    part[..n].copy_from_slice(&given[..n]);
+                }
+            }
+        }
+    }
+
     #[inline(always)]
     fn slopes(&self, i: usize) -> [f64; N] {
         let mut slopes = [0.0; N];
@@ -422,6 +468,7 @@ impl<const N: usize> Octaves<N> {
         let Self {
             cells,
             along,
+            full,
             sample,
             total,
             rest,
@@ -440,7 +487,13 @@ impl<const N: usize> Octaves<N> {
             if N == 1 {
                 directions(n, &octave.matrix, at, along);
             }
-            sample.fill(simd, n, octave.lattice, cells, along);
+            match &octave.noise {
+                None => sample.fill(simd, n, octave.lattice, cells, along),
+                Some(any) => {
+                    batch::values_gradients(simd, n, any, cells, &mut sample.noise, full);
+                    sample.take(n, full, along);
+                }
+            }
             add(cascade.model, Place { n, i, octave }, sample, total, rest);
         }
         noises

@@ -148,6 +148,75 @@ fn grids() -> [(&'static str, Op, &'static [f64]); 6] {
     ]
 }
 
+/// Fields of every noise but gradient noise.
+///
+/// Their derivatives are computed in f32, so they are compared with differences less closely than the rest: see `noise::tests`.
+pub(crate) fn noise_zoo() -> Vec<(String, Program)> {
+    let mut zoo = Vec::new();
+    let mut add = |name: String, op: Op, cells: f64, params: &[f64]| {
+        let mut g = Graph::new();
+        let p = scaled(&mut g, cells);
+        let mut root = g.push(op, &[p], params).unwrap();
+        if g.kind(root) == crate::Kind::Vector {
+            root = g.push(Op::Z, &[root], &[]).unwrap();
+        }
+        let program = Program::compile(&g, &[root], Interval::new(0.0, 1.0)).unwrap();
+        zoo.push((name, program));
+    };
+    for (name, op, params) in noises() {
+        add(name.clone(), op, 0.7, &params);
+        let over: Vec<f64> = [f64::from(op.code())].into_iter().chain(params).collect();
+        if ["value", "simplex", "sparse quintic", "cellular edges"].contains(&name.as_str()) {
+            let cascade = [0.0, 0.0, 3.0, 2.0, 0.9, 3.0, 0.0, 1.0, 1.0, 2.0, 1.0];
+            let params: Vec<f64> = cascade.into_iter().chain(over.iter().copied()).collect();
+            add(format!("cascade of {name}"), Op::Cascade, 0.5, &params);
+        }
+        if ["value-gradient", "simplex", "disc quintic"].contains(&name.as_str()) {
+            add(format!("gradient of {name}"), Op::NoiseGradient, 0.8, &over);
+        }
+    }
+    zoo
+}
+
+/// A noise of every kind with its constants.
+pub(crate) fn noises() -> Vec<(String, Op, Vec<f64>)> {
+    let mut list = Vec::new();
+    let mut add = |name: &str, op: Op, params: &[f64]| {
+        list.push((name.to_owned(), op, params.to_vec()));
+    };
+    add("value", Op::ValueNoise, &[5.0]);
+    add("value-gradient", Op::ValueGradientNoise, &[5.0]);
+    add("simplex", Op::SimplexNoise, &[5.0]);
+    for (kernel, name) in ["Lewis", "quintic", "linear"].into_iter().enumerate() {
+        let kernel = [0.0, 1.0, 2.0][kernel];
+        add(
+            &format!("sparse {name}"),
+            Op::SparseNoise,
+            &[5.0, 2.0, kernel, 0.0],
+        );
+        add(
+            &format!("disc {name}"),
+            Op::SparseNoise,
+            &[5.0, 1.0, kernel, 1.0],
+        );
+    }
+    let one = [1.0, 0.0, 0.0, 0.0];
+    let edges = [-1.0, 1.0, 0.0, 0.0];
+    let all = [0.5, -0.25, 0.125, 1.0];
+    for (name, norm, density, a, squared) in [
+        ("cellular", 2.0, 2.0, one, 0.0),
+        ("cellular edges", 2.0, 1.0, edges, 0.0),
+        ("cellular Manhattan", 1.0, 2.0, all, 0.0),
+        ("cellular maximum", 0.0, 0.5, edges, 0.0),
+        ("cellular 1.5", 1.5, 2.0, one, 0.0),
+        ("cellular 4 squared", 4.0, 4.0, all, 1.0),
+    ] {
+        let params = [5.0, norm, density, a[0], a[1], a[2], a[3], squared, 1.0];
+        add(name, Op::CellularNoise, &params);
+    }
+    list
+}
+
 pub(crate) fn position(g: &mut Graph) -> [NodeId; 3] {
     let p = g.push(Op::Position, &[], &[]).unwrap();
     [Op::X, Op::Y, Op::Z].map(|op| g.push(op, &[p], &[]).unwrap())
@@ -265,7 +334,7 @@ fn bits(values: &[f64]) -> Vec<u64> {
 fn every_level_gives_the_same_bits() {
     let places = Places::new(2000, 1);
     let points = places.points();
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         let reference = values(&program, SimdLevel::scalar(), &points);
         let (value, gradient) = gradients(&program, SimdLevel::scalar(), &points);
         assert_eq!(
@@ -296,7 +365,7 @@ fn every_level_gives_the_same_bits() {
 #[test]
 fn neighbours_do_not_matter() {
     let places = Places::new(300, 2);
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         let whole = values(&program, SimdLevel::best(), &places.points());
         let mut scratch = Scratch::new();
         let mut pieces = vec![0.0; 300];
@@ -321,7 +390,7 @@ fn neighbours_do_not_matter() {
 fn gradients_agree_with_differences() {
     const STEP: f64 = 1e-4;
     let mut compared = 0;
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         if name == "planet" {
             // At 6 371 km a difference over this step is rounding; planets have their own test.
             continue;

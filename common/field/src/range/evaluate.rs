@@ -3,6 +3,7 @@
 use crate::arithmetic::Unary;
 use crate::cascade::{self, Carried, Cascade, Model, Term};
 use crate::interval::Interval;
+use crate::noise::{Noise, simplex};
 use crate::number::Number;
 use crate::program::Program;
 use crate::program::plan::{Act, Plan, Step};
@@ -148,11 +149,17 @@ impl<T: Arithmetic> Ground<T> {
             Act::Power(exponent) => s(0).power(*exponent),
             Act::SmoothStep(low, high) => s(0).apply(Function::SmoothStep(*low, *high)),
             Act::Select => s(0).select(s(1), s(2)),
+            Act::NoiseGradient(noise) => {
+                let slopes = T::noise_slopes(noise, skewed(noise, v(0)));
+                // The skewing is symmetric: it is its own transpose.
+                return Value::Vector(skewed(noise, slopes));
+            }
             Act::Noise(lattice) => T::noise(*lattice, v(0)),
             Act::Shape(shape) => match step.args[..] {
                 [_, _] => T::shape(shape, [s(0), s(1), T::constant(0.0)]),
                 _ => T::shape(shape, v(0)),
             },
+            Act::AnyNoise(noise) => T::any_noise(noise, skewed(noise, v(0))),
             Act::Cascade(cascade) => octaves(cascade, &v(0), self.footprint),
             Act::Grid(surface) => T::grid(surface, v(0)),
         };
@@ -194,7 +201,10 @@ fn octaves<T: Arithmetic>(cascade: &Cascade, at: &[T; 3], footprint: Interval) -
         if deep.is_nan() || deep <= i {
             break;
         }
-        let noise = T::noise(octave.lattice, look(octave, at));
+        let noise = match &octave.noise {
+            None => T::noise(octave.lattice, look(octave, at)),
+            Some(noise) => T::any_noise(noise, look(octave, at)),
+        };
         let term = |depth: f64| Term {
             first: i == 0.0,
             amplitude: octave.amplitude,
@@ -210,6 +220,16 @@ fn octaves<T: Arithmetic>(cascade: &Cascade, at: &[T; 3], footprint: Interval) -
         };
     }
     carried.0
+}
+
+/// The coordinates that a noise is a function of, as `simplex::skew` computes them.
+fn skewed<T: Number>(noise: &Noise, at: [T; 3]) -> [T; 3] {
+    if !noise.is_skewed() {
+        return at;
+    }
+    let [x, y, z] = at.clone();
+    let by = x.plus(y).plus(z).times(simplex::SKEW);
+    at.map(|part| part.plus(by.clone()))
 }
 
 /// Where an octave looks.

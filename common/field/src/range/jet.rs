@@ -6,7 +6,8 @@ use crate::arithmetic::{Binary, Unary};
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
-use crate::noise::Lattice;
+use crate::noise::jet::Jet2;
+use crate::noise::{self, Lattice, Noise};
 use crate::number::Number;
 use crate::range::function::Function;
 use crate::range::{Arithmetic, lattice};
@@ -215,4 +216,43 @@ impl Arithmetic for Jet {
         let exact = lattice::gradient_noise(lattice, at);
         Self { value, ..exact }
     }
+
+    /// Value and derivatives are those of evaluation, good to f32.
+    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
+        let jet = noise_at(noise, &at);
+        let slopes = jet.gradient.map(f64::from);
+        let bends = [0, 1, 2].map(|axis| jet.row(axis).map(f64::from));
+        composed(f64::from(jet.value), slopes, bends, &at)
+    }
+
+    /// A noise has no third derivatives here: those of its gradient's components count as 0.
+    fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
+        let jet = noise_at(noise, &at);
+        [0, 1, 2].map(|axis| {
+            let slopes = jet.row(axis).map(f64::from);
+            composed(f64::from(jet.gradient[axis]), slopes, [[0.0; 3]; 3], &at)
+        })
+    }
+}
+
+fn noise_at(noise: &Noise, at: &[Jet; 3]) -> Jet2 {
+    let [(x, u), (y, v), (z, w)] = at.map(|part| noise::split(part.value));
+    noise.jet2([x, y, z], [u, v, w])
+}
+
+/// A function of three numbers with these derivatives by them, thesis eq. (2.18) mended: ERRATA.
+fn composed(value: f64, slopes: [f64; 3], bends: [[f64; 3]; 3], at: &[Jet; 3]) -> Jet {
+    let mut sum = Jet::constant(value);
+    for k in 0..3 {
+        for i in 0..3 {
+            sum.gradient[i] += slopes[k] * at[k].gradient[i];
+            for j in 0..3 {
+                sum.hessian[i][j] += slopes[k] * at[k].hessian[i][j];
+                for l in 0..3 {
+                    sum.hessian[i][j] += bends[k][l] * at[k].gradient[i] * at[l].gradient[j];
+                }
+            }
+        }
+    }
+    sum
 }

@@ -45,7 +45,7 @@ pub use slope::Slope;
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
-use crate::noise::Lattice;
+use crate::noise::{Lattice, Noise};
 use crate::number::Number;
 use crate::shape::Shape;
 use function::Function;
@@ -92,5 +92,17 @@ pub(crate) trait Arithmetic: Number {
     /// A discrete surface at a place.
     fn grid(surface: &Surface, at: [Self; 3]) -> Self {
         grid::mean_value(surface, at)
+    }
+
+    /// Any other noise, by skewed coordinates if it is skewed: its value midway, and its steepest slope on either side.
+    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
+        Self::any(noise.over(at.each_ref().map(Self::range)))
+    }
+
+    /// The gradient of a noise, by skewed coordinates if it is skewed.
+    fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
+        noise
+            .slopes_over(at.each_ref().map(Self::range))
+            .map(Self::any)
     }
 }

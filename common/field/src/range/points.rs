@@ -3,7 +3,7 @@
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
-use crate::noise::{self, Lattice};
+use crate::noise::{self, Lattice, Noise};
 use crate::range::Arithmetic;
 use crate::range::function::Function;
 use crate::shape::Shape;
@@ -52,5 +52,15 @@ impl Arithmetic for f64 {
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
         let [(x, u), (y, v), (z, w)] = at.map(noise::split);
         f64::from(noise::value(noise::corners(lattice, [x, y, z]), [u, v, w]))
+    }
+
+    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
+        let [(x, u), (y, v), (z, w)] = at.map(noise::split);
+        f64::from(noise.value([x, y, z], [u, v, w]))
+    }
+
+    fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
+        let [(x, u), (y, v), (z, w)] = at.map(noise::split);
+        noise.jet([x, y, z], [u, v, w]).gradient.map(f64::from)
     }
 }

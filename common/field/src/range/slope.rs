@@ -7,6 +7,7 @@ use crate::arithmetic::Unary;
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
+use crate::noise::Noise;
 use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::Function;
@@ -201,4 +202,25 @@ impl<const N: usize> Arithmetic for Slope<N> {
             Interval::new(-steepest, steepest),
         )
     }
+
+    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
+        let value = noise.over(at.each_ref().map(Self::range));
+        composed(value, noise.slope() + noise.slope_rounding(), &at)
+    }
+
+    fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
+        let values = noise.slopes_over(at.each_ref().map(Self::range));
+        values.map(|value| composed(value, noise.bend(), &at))
+    }
+}
+
+/// A function of three numbers that is nowhere steeper than `steepest`.
+fn composed<const N: usize>(value: Interval, steepest: f64, at: &[Slope<N>; 3]) -> Slope<N> {
+    let mut slopes = [Interval::point(0.0); N];
+    for (i, slope) in slopes.iter_mut().enumerate() {
+        let [x, y, z] = at.each_ref().map(|part| part.slopes[i].magnitude());
+        let most = steepest * (x * x + y * y + z * z).sqrt();
+        *slope = Interval::new(-most, most).widen();
+    }
+    Slope { value, slopes }
 }

@@ -6,7 +6,7 @@ use crate::arithmetic::{Binary, Unary};
 use crate::hash::{hash, unit};
 use crate::interval::Interval;
 use crate::number::Number;
-use crate::program::tests::zoo;
+use crate::program::tests::{noise_zoo, zoo};
 use crate::{Points, Program, Scratch, SimdLevel};
 
 /// Random numbers in [−1, 1], by name.
@@ -254,12 +254,13 @@ fn over_segments(count: u32, mut check: impl FnMut(&Segment, &[(f64, Place)])) {
 #[test]
 fn every_field_stays_within_its_ranges_along_segments() {
     let (mut spans, mut forms) = (0.0, 0.0);
-    // Most shapes are known by their bounds alone, and those are intervals.
+    // Most shapes are known by their bounds alone, and those are intervals; noises but gradient noise by their slopes.
     let shapes: Vec<String> = crate::shape::tests::zoo()
         .into_iter()
         .map(|(name, ..)| name)
+        .chain(noise_zoo().into_iter().map(|(name, _)| name))
         .collect();
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         let bounded_alone = shapes.contains(&name);
         over_segments(500, |segment, places| {
             let interval = program.along_interval(segment);
@@ -301,7 +302,7 @@ fn every_field_stays_within_its_ranges_along_segments() {
 
 #[test]
 fn slopes_along_segments_hold_every_chord() {
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         if name == "select" {
             continue;
         }
@@ -335,7 +336,7 @@ fn slopes_along_segments_hold_every_chord() {
 
 #[test]
 fn every_field_stays_within_its_ranges_over_boxes_and_cells() {
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         for i in 0..250u32 {
             let part = |k: u32| number(&[i, k, 41]);
             let size = scale(&[i, 9, 41]);
@@ -432,7 +433,7 @@ fn evaluated(program: &Program, place: &Place) -> (f64, [f64; 3]) {
 
 #[test]
 fn points_and_jets_are_what_evaluation_gives() {
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         over_segments(150, |_, places| {
             for (_, place) in places {
                 let (value, gradient) = evaluated(&program, place);
@@ -554,7 +555,7 @@ impl Sine for f64 {
 #[test]
 fn what_is_unknown_stays_unknown_and_nothing_panics() {
     let wild = [f64::NAN, f64::INFINITY, -f64::INFINITY, 1e300, -0.0];
-    for (name, program) in zoo() {
+    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
         for a in wild {
             for b in wild {
                 let place = Place {

@@ -1,13 +1,12 @@
 //! The noises and their frequency cascades, with options as a map: `#{octaves: 8, hurst: 0.8}`.
 
 use field::op::Params;
-use field::{Basis, Op};
-use rhai::{Dynamic, Map};
+use field::{Basis, NodeId, Op};
+use rhai::{Array, Dynamic, Map};
 
 use super::Shared;
-use super::options::Options;
-use super::values::{Made, Operand, refuse};
-
+use super::noises::known_options;
+use super::values::{Made, Operand, Scalar, refuse};
 /// A cascade's name, what it does, and what its options are where they are not given.
 pub(super) struct Cascade {
     pub(super) name: &'static str,
@@ -84,8 +83,51 @@ impl Cascade {
     fn options(&self) -> &'static [&'static str] {
         match self.op.signature().params {
             Params::Named(names) => names,
-            Params::Keys | Params::List => unreachable!("a cascade has named options"),
+            Params::Keys | Params::List | Params::OverNoise(_) => {
+                unreachable!("a cascade has named options")
+            }
         }
+    }
+}
+
+/// Options of every cascade that are not constants of its own operation.
+const MORE: &[&str] = &["noise", "first", "power"];
+
+/// Places among the constants of a cascade over any noise.
+const LACUNARITY: usize = 3;
+const HURST: usize = 4;
+const OCTAVES: usize = 5;
+const FIRST: usize = 10;
+
+impl Cascade {
+    /// A constant of the cascade from its options.
+    fn option(&self, options: &Map, option: &str) -> Made<f64> {
+        match options.get(option) {
+            Some(value) if option == "basis" => basis(value),
+            Some(value) => Shared::constant(&format!("{}: {option}", self.name), value),
+            None => Ok(self.default_of(option)),
+        }
+    }
+
+    /// The named constants of [`Op::Cascade`] that say what this cascade does; H is left out where it is given otherwise.
+    fn over(&self, options: &Map, without_hurst: bool) -> Made<Vec<f64>> {
+        let Params::OverNoise(names) = Op::Cascade.signature().params else {
+            unreachable!("it goes over a noise")
+        };
+        let own = self.options();
+        let value = |name: &&str| match *name {
+            "model" => Ok(match self.op {
+                Op::AltitudeOne => 1.0,
+                Op::AltitudeTwo => 2.0,
+                Op::RidgedMultifractal => 3.0,
+                _ => 0.0,
+            }),
+            "hurst" if without_hurst => Ok(self.hurst),
+            "first" => self.option(options, "first"),
+            name if own.contains(&name) => self.option(options, name),
+            name => Ok(self.default_of(name)),
+        };
+        names.iter().map(value).collect()
     }
 }
 
@@ -100,18 +142,134 @@ impl Shared {
     pub(super) fn cascade(&self, cascade: &Cascade, at: &Dynamic, options: &Map) -> Made<Dynamic> {
         let name = cascade.name;
         let at = Self::vector(name, at)?;
-        let known = cascade.options();
-        Options::new(name, known, options)?;
-        let params = known
-            .iter()
-            .map(|option| match options.get(*option) {
-                Some(value) if *option == "basis" => basis(value),
-                Some(value) => Self::constant(&format!("{name}: {option}"), value),
-                None => Ok(cascade.default_of(option)),
-            })
-            .collect::<Made<Vec<_>>>()?;
-        Ok(Operand::Scalar(self.push(cascade.op, &[at], &params)?).into_dynamic())
+        let known: Vec<_> = cascade.options().iter().chain(MORE).copied().collect();
+        known_options(name, options, &known)?;
+        let power = match options.get("power") {
+            Some(power) => Self::constant(&format!("{name}: power"), power)?,
+            None => 1.0,
+        };
+        let sum = match options.get("hurst") {
+            Some(hurst) if hurst.is::<Scalar>() => self.varying(cascade, at, options, hurst)?,
+            Some(hurst) if hurst.is_array() => {
+                let list = hurst.clone().try_cast::<Array>().unwrap_or_default();
+                if list.is_empty() {
+                    return refuse(
+                        format!("`{name}: hurst` is an empty list"),
+                        "hurst: [0.9, 0.8, 0.7] gives one coefficient for each octave",
+                    );
+                }
+                let hursts = list
+                    .iter()
+                    .map(|hurst| Self::constant(&format!("{name}: hurst"), hurst))
+                    .collect::<Made<Vec<_>>>()?;
+                self.cascade_over(cascade, at, options, &hursts)?
+            }
+            _ if options.contains_key("noise") || options.contains_key("first") => {
+                self.cascade_over(cascade, at, options, &[])?
+            }
+            _ => {
+                let params = cascade
+                    .options()
+                    .iter()
+                    .map(|option| cascade.option(options, option))
+                    .collect::<Made<Vec<_>>>()?;
+                self.push(cascade.op, &[at], &params)?
+            }
+        };
+        if power == 1.0 {
+            return Ok(Operand::Scalar(sum).into_dynamic());
+        }
+        self.power(
+            &Operand::Scalar(sum).into_dynamic(),
+            &Dynamic::from_float(power),
+        )
     }
+
+    /// A cascade over any noise, with a Hurst coefficient for each octave if there are some.
+    fn cascade_over(
+        &self,
+        cascade: &Cascade,
+        at: NodeId,
+        options: &Map,
+        hursts: &[f64],
+    ) -> Made<NodeId> {
+        let mut params = cascade.over(options, !hursts.is_empty())?;
+        if !hursts.is_empty() && !options.contains_key("octaves") {
+            #[expect(
+                clippy::cast_precision_loss,
+                reason = "a list has at most 1024 entries"
+            )]
+            let count = hursts.len() as f64;
+            params[OCTAVES] = count;
+        }
+        let (op, constants) = Self::noise_option(cascade.name, options.get("noise"))?;
+        params.push(f64::from(op.code()));
+        params.extend(constants);
+        params.extend(hursts);
+        self.push(Op::Cascade, &[at], &params)
+    }
+
+    /// Rescale-and-add with H varying over space (thesis §3.3.3): Σ r^{−iH(x)} basis(rⁱ x), an octave at a time.
+    fn varying(
+        &self,
+        cascade: &Cascade,
+        at: NodeId,
+        options: &Map,
+        hurst: &Dynamic,
+    ) -> Made<NodeId> {
+        let name = cascade.name;
+        if cascade.op != Op::Sum {
+            return refuse(
+                format!("`{name}: hurst` wants a constant number here, not a field"),
+                "fbm, turbulence and ridged take a Hurst coefficient that varies over space",
+            );
+        }
+        let hurst = self.scalar(name, Self::operand(name, hurst)?)?;
+        let params = cascade.over(options, true)?;
+        let (octaves, first, lacunarity) = (params[OCTAVES], params[FIRST], params[LACUNARITY]);
+        let whole = (1.0..=48.0).contains(&octaves) && octaves % 1.0 == 0.0;
+        if !whole || !(1.1..=16.0).contains(&lacunarity) {
+            // The graph says what is wrong with them.
+            return self.cascade_over(cascade, at, &without_hurst(options), &[]);
+        }
+        // r^{−H}, whose powers weight the octaves.
+        let factor = self.push(Op::Constant, &[], &[-libm::log(lacunarity)])?;
+        let exponent = self.push(Op::Mul, &[hurst, factor], &[])?;
+        let fall = self.push(Op::Exp, &[exponent], &[])?;
+        let (op, constants) = Self::noise_option(name, options.get("noise"))?;
+        let mut total: Option<NodeId> = None;
+        let mut weight: Option<NodeId> = None;
+        let mut i = 0.0;
+        while i < first + octaves {
+            if i >= first {
+                let mut params = params.clone();
+                (params[HURST], params[OCTAVES], params[FIRST]) = (0.0, 1.0, i);
+                params.push(f64::from(op.code()));
+                params.extend(&constants);
+                let octave = self.push(Op::Cascade, &[at], &params)?;
+                let term = match weight {
+                    Some(weight) => self.push(Op::Mul, &[weight, octave], &[])?,
+                    None => octave,
+                };
+                total = Some(match total {
+                    Some(total) => self.push(Op::Add, &[total, term], &[])?,
+                    None => term,
+                });
+            }
+            weight = Some(match weight {
+                Some(weight) => self.push(Op::Mul, &[weight, fall], &[])?,
+                None => fall,
+            });
+            i += 1.0;
+        }
+        Ok(total.expect("there is an octave"))
+    }
+}
+
+fn without_hurst(options: &Map) -> Map {
+    let mut options = options.clone();
+    options.remove("hurst");
+    options
 }
 
 fn basis(value: &Dynamic) -> Made<f64> {

@@ -9,6 +9,7 @@ use rhai::{Array, Dynamic, Engine, FLOAT, INT, Map, OptimizationLevel};
 use super::Shared;
 use super::cascades::CASCADES;
 use super::grids;
+use super::noises::NOISES;
 use super::refusal;
 use super::shapes;
 use super::solids;
@@ -32,6 +33,15 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "spectral_flakes",
     "sea",
     "midpoint_terrain",
+    "weierstrass",
+    "gradient_noise",
+    "value_noise",
+    "value_gradient_noise",
+    "simplex",
+    "sparse",
+    "cellular",
+    "gradient",
+    "warp",
     "length",
     "dot",
     "vec",
@@ -113,6 +123,7 @@ pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
     shapes::register(&mut engine, shared);
     solids::register(&mut engine, shared);
     grids::register(&mut engine, shared);
+    noises(&mut engine, shared);
     names(&mut engine, shared);
     engine
 }
@@ -287,6 +298,40 @@ fn functions(engine: &mut Engine, shared: &Rc<Shared>) {
     engine.register_fn("noise", move |v: Dynamic, key: Dynamic| {
         s.noise(&v, Shared::constant("noise", &key)?)
     });
+}
+
+/// A function of a place and a map of options.
+type OfPlace = fn(&Shared, &Dynamic, &Map) -> Made<Dynamic>;
+
+fn noises(engine: &mut Engine, shared: &Rc<Shared>) {
+    for noise in NOISES {
+        let s = shared.clone();
+        engine.register_fn(noise.name, move |v: Dynamic| {
+            s.noise_function(noise, &v, &Map::new())
+        });
+        let s = shared.clone();
+        engine.register_fn(noise.name, move |v: Dynamic, options: Map| {
+            s.noise_function(noise, &v, &options)
+        });
+        let s = shared.clone();
+        engine.register_fn(noise.name, move |v: Dynamic, key: Dynamic| {
+            Shared::constant(noise.name, &key)?;
+            s.noise_function(noise, &v, &Map::from([("key".into(), key)]))
+        });
+    }
+    let of_place: [(&str, OfPlace); 3] = [
+        ("gradient", Shared::noise_gradient),
+        ("warp", Shared::warp),
+        ("weierstrass", Shared::weierstrass),
+    ];
+    for (name, function) in of_place {
+        let s = shared.clone();
+        engine.register_fn(name, move |v: Dynamic| function(&s, &v, &Map::new()));
+        let s = shared.clone();
+        engine.register_fn(name, move |v: Dynamic, options: Map| {
+            function(&s, &v, &options)
+        });
+    }
 }
 
 fn cascades(engine: &mut Engine, shared: &Rc<Shared>) {
