@@ -21,8 +21,10 @@ mod proofs;
 pub(crate) mod ranges;
 pub mod simplex;
 pub mod sparse;
+pub mod spot;
 #[cfg(test)]
 mod tests;
+pub(crate) mod wavelet;
 
 pub use gradient::{BEND, RANGE, ROUNDING, SLOPE, noise, noise_gradient};
 pub(crate) use gradient::{

@@ -196,6 +196,13 @@ ops! {
     CellularNoise = 84 "cellular" (Vector) Params::Named(&[
         "key", "norm", "density", "a1", "a2", "a3", "a4", "squared", "unbiased",
     ]) => Scalar;
+    /// Spot noise at a, thesis eq. (4.17): `nodes` per cell with `kernel`, `stretch` times as long as wide along
+    /// (`x`, `y`, `z`), or along a random axis if that is 0, with radii from 1 − `variety` to 1.
+    SpotNoise = 85 "spot" (Vector) Params::Named(&[
+        "key", "nodes", "kernel", "stretch", "variety", "axis x", "axis y", "axis z",
+    ]) => Scalar;
+    /// Wavelet noise at a, thesis eq. (4.23).
+    WaveletNoise = 86 "wavelet" (Vector) Params::Named(&["key"]) => Scalar;
     /// A cascade as 65 to 68 (`model` 0 to 3 in their order) over any noise, from octave `first` on;
     /// after the noise a Hurst coefficient for each octave, or none.
     Cascade = 88 "cascade" (Vector) Params::OverNoise(&[

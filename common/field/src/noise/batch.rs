@@ -1,6 +1,6 @@
 //! Noises over the lanes of a batch. Every lane is computed by the same code at every SIMD level.
 //!
-//! The lattice noises have no branches and their loops become vectors; those with scattered nodes look into
+//! Gradient noise has loops of its own. The other lattice noises have no branches and their loops become vectors; those with scattered nodes look into
 //! other cells at every place, so they run lane by lane.
 
 use fearless_simd::Simd;
@@ -95,9 +95,6 @@ fn each<S: Simd, R: Lane>(
         };
     }
     match noise {
-        Noise::Lattice(corner @ Corner::Gradient, own) => {
-            vector!(|cell, offset| lattice::at(*corner, *own, cell, offset));
-        }
         Noise::Lattice(Corner::Value, own) => {
             vector!(|cell, offset| lattice::at(Corner::Value, *own, cell, offset));
         }

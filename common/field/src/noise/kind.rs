@@ -6,6 +6,8 @@ use super::jet::{Jet, Jet2, Real};
 use super::lattice::{self, Corner};
 use super::simplex;
 use super::sparse::{Kernel, Scatter, Sparse};
+use super::spot::Spot;
+use super::wavelet;
 use crate::interval::Interval;
 use crate::op::Op;
 
@@ -15,6 +17,8 @@ pub(crate) enum Noise {
     Lattice(Corner, Lattice),
     Simplex(Lattice),
     Sparse(Sparse),
+    Spot(Spot),
+    Wavelet(Lattice),
     Cellular(Box<Cellular>),
 }
 
@@ -34,6 +38,18 @@ impl Noise {
                 kernel: Kernel::from_number(kernel)?,
                 scatter: Scatter::from_number(scatter)?,
             }),
+            (Op::SpotNoise, &[nodes, kernel, stretch, variety, x, y, z]) => Self::Spot(Spot {
+                nodes: Sparse {
+                    lattice,
+                    nodes: whole(nodes),
+                    kernel: Kernel::from_number(kernel)?,
+                    scatter: Scatter::Uniform,
+                },
+                stretch: narrow(stretch),
+                variety: narrow(variety),
+                axis: unit([x, y, z]),
+            }),
+            (Op::WaveletNoise, []) => Self::Wavelet(lattice),
             (Op::CellularNoise, &[norm, density, a, b, c, d, squared, unbiased]) => {
                 let options = cellular::Options {
                     norm,
@@ -53,7 +69,8 @@ impl Noise {
         let lattice = Lattice::new(key);
         let mut noise = self.clone();
         match &mut noise {
-            Self::Lattice(_, own) | Self::Simplex(own) => *own = lattice,
+            Self::Lattice(_, own) | Self::Simplex(own) | Self::Wavelet(own) => *own = lattice,
+            Self::Spot(spot) => *spot.lattice_mut() = lattice,
             Self::Sparse(sparse) => sparse.lattice = lattice,
             Self::Cellular(cellular) => cellular.lattice = lattice,
         }
@@ -74,6 +91,8 @@ impl Noise {
             Self::Lattice(Corner::ValueGradient, _) => around(lattice::VALUE_GRADIENT_RANGE),
             Self::Simplex(_) => around(simplex::RANGE),
             Self::Sparse(sparse) => around(sparse.range()).expand(sparse.rounding()),
+            Self::Spot(spot) => around(spot.range()).expand(spot.rounding()),
+            Self::Wavelet(_) => around(wavelet::range()).expand(self.rounding()),
             Self::Cellular(cellular) => {
                 let (low, high) = cellular.range();
                 Interval::new(low, high)
@@ -89,6 +108,8 @@ impl Noise {
             Self::Lattice(Corner::ValueGradient, _) => lattice::VALUE_GRADIENT_SLOPE,
             Self::Simplex(_) => simplex::SLOPE,
             Self::Sparse(sparse) => sparse.slope(),
+            Self::Spot(spot) => spot.slope(),
+            Self::Wavelet(_) => wavelet::slope(),
             Self::Cellular(cellular) => cellular.slope(),
         }
     }
@@ -101,6 +122,8 @@ impl Noise {
             Self::Lattice(Corner::ValueGradient, _) => lattice::GRADIENT_BEND + lattice::VALUE_BEND,
             Self::Simplex(_) => simplex::BEND,
             Self::Sparse(sparse) => sparse.bend(),
+            Self::Spot(spot) => spot.bend(),
+            Self::Wavelet(_) => wavelet::bend(),
             Self::Cellular(_) => f64::INFINITY,
         }
     }
@@ -112,6 +135,8 @@ impl Noise {
             Self::Lattice(..) => 2.0 * gradient::ROUNDING,
             Self::Simplex(_) => 8e-6,
             Self::Sparse(sparse) => sparse.rounding(),
+            Self::Spot(spot) => spot.rounding(),
+            Self::Wavelet(_) => 4e-6,
             Self::Cellular(cellular) => cellular.rounding(),
         }
     }
@@ -202,9 +227,25 @@ impl Noise {
             }
             Self::Simplex(own) => simplex::at(*own, cell, offset),
             Self::Sparse(sparse) => sparse.at(cell, offset),
+            Self::Spot(spot) => spot.at(cell, offset),
+            Self::Wavelet(own) => wavelet::at(*own, cell, offset),
             Self::Cellular(_) => unreachable!("it is no sum of smooth kernels"),
         }
     }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the noise computes with f32"
+)]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// The direction of a vector, `None` if it has none.
+fn unit(v: [f64; 3]) -> Option<[f32; 3]> {
+    let length = crate::arithmetic::length(v);
+    (length > 0.0).then(|| v.map(|part| narrow(part / length)))
 }
 
 /// A whole number among an operation's constants; the graph checked its range.

@@ -2,6 +2,7 @@
 
 use super::cellular::{DENSITY_MAX, DENSITY_MIN, NORM_MAX};
 use super::sparse::{Kernel, NODES_MAX, Scatter};
+use super::spot::{STRETCH_MAX, VARIETY_MAX};
 use crate::op::{Op, Params};
 
 /// What a constant should have been, and what it is.
@@ -17,6 +18,8 @@ pub(crate) fn is_noise(op: Op) -> bool {
             | Op::SimplexNoise
             | Op::SparseNoise
             | Op::CellularNoise
+            | Op::SpotNoise
+            | Op::WaveletNoise
     )
 }
 
@@ -28,6 +31,10 @@ pub(crate) fn refused(op: Op, params: &[f64]) -> Option<Refused> {
     }
     match (op, &params[1..]) {
         (Op::SparseNoise, &[nodes, kernel, scatter]) => sparse(nodes, kernel, scatter),
+        (Op::SpotNoise, &[nodes, kernel, stretch, variety, ..]) => {
+            let uniform = Scatter::Uniform.number();
+            sparse(nodes, kernel, uniform).or_else(|| spot(stretch, variety))
+        }
         (Op::CellularNoise, &[norm, density, ref weights @ .., squared, unbiased]) => {
             cellular(norm, density, weights).or_else(|| {
                 [squared, unbiased]
@@ -54,6 +61,16 @@ fn sparse(nodes: f64, kernel: f64, scatter: f64) -> Option<Refused> {
         }
         Some(_) => None,
     }
+}
+
+fn spot(stretch: f64, variety: f64) -> Option<Refused> {
+    if !(1.0..=STRETCH_MAX).contains(&stretch) {
+        return Some(("a stretch from 1 to 8", stretch));
+    }
+    if !(0.0..=VARIETY_MAX).contains(&variety) {
+        return Some(("a variety of sizes from 0 to 0.875", variety));
+    }
+    None
 }
 
 fn cellular(norm: f64, density: f64, weights: &[f64]) -> Option<Refused> {

@@ -232,7 +232,9 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::ValueGradientNoise
         | Op::SimplexNoise
         | Op::SparseNoise
-        | Op::CellularNoise => {
+        | Op::CellularNoise
+        | Op::SpotNoise
+        | Op::WaveletNoise => {
             let noise = Noise::new(node.op, params);
             Act::AnyNoise(noise.expect("the graph checked the constants"))
         }

@@ -40,6 +40,8 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "simplex",
     "sparse",
     "cellular",
+    "spot",
+    "wavelet",
     "gradient",
     "warp",
     "length",

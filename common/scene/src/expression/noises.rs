@@ -82,6 +82,45 @@ pub(super) const NOISES: &[NoiseFunction] = &[
         ],
     },
     NoiseFunction {
+        name: "spot",
+        op: Op::SpotNoise,
+        about: "Spot noise (4.17): sparse convolution whose kernels are ellipsoids that differ from node to node.",
+        options: &[
+            KEY,
+            NoiseOption {
+                name: "nodes",
+                default: "1",
+                about: "Nodes per cell, 1 to 8.",
+            },
+            NoiseOption {
+                name: "kernel",
+                default: "\"quintic\"",
+                about: "\"quintic\", \"lewis\" or \"linear\", as of sparse noise.",
+            },
+            NoiseOption {
+                name: "stretch",
+                default: "2",
+                about: "How many times a spot is longer than wide, 1 to 8.",
+            },
+            NoiseOption {
+                name: "variety",
+                default: "0.5",
+                about: "Radii run from 1 less this to 1 cell, 0 to 0.875.",
+            },
+            NoiseOption {
+                name: "axis",
+                default: "[0, 0, 0]",
+                about: "Along which spots are long; [0, 0, 0]: each along one of its own.",
+            },
+        ],
+    },
+    NoiseFunction {
+        name: "wavelet",
+        op: Op::WaveletNoise,
+        about: "Wavelet noise (4.23): frequencies of one octave, 1/4 to 1/2 per cell, with a deviation of 0.3.",
+        options: &[KEY],
+    },
+    NoiseFunction {
         name: "cellular",
         op: Op::CellularNoise,
         about: "Cellular noise (4.18): distances to the nearest of Poisson-distributed nodes, less their mean.",
@@ -158,6 +197,17 @@ impl NoiseFunction {
                 one_of(name, options, "kernel", &KERNELS)?,
                 one_of(name, options, "scatter", &SCATTERS)?,
             ],
+            Op::SpotNoise => {
+                let mut constants = vec![
+                    key,
+                    number("nodes", 1.0)?,
+                    one_of(name, options, "kernel", &KERNELS)?,
+                    number("stretch", 2.0)?,
+                    number("variety", 0.5)?,
+                ];
+                constants.extend(axis(name, options)?);
+                constants
+            }
             Op::CellularNoise => {
                 let norm = match options.get("norm").map(text) {
                     Some(Some(text)) if text == "max" => 0.0,
@@ -229,6 +279,26 @@ fn flag(function: &str, options: &Map, option: &str, default: f64) -> Made<f64> 
         Some(Err(_)) => refuse(
             format!("`{function}: {option}` is true or false"),
             format!("write {option}: true"),
+        ),
+    }
+}
+
+/// The common axis of spots.
+fn axis(function: &str, options: &Map) -> Made<[f64; 3]> {
+    let mut axis = [0.0; 3];
+    let Some(value) = options.get("axis") else {
+        return Ok(axis);
+    };
+    match value.clone().try_cast::<Array>() {
+        Some(list) if list.len() == 3 => {
+            for (part, value) in axis.iter_mut().zip(&list) {
+                *part = Shared::constant(&format!("{function}: axis"), value)?;
+            }
+            Ok(axis)
+        }
+        _ => refuse(
+            format!("`{function}: axis` is a list of three numbers"),
+            "axis: [1, 0, 0] makes spots long in x",
         ),
     }
 }
@@ -332,6 +402,17 @@ impl Shared {
 
     fn gradient_node(&self, function: &str, at: NodeId, options: &Map) -> Made<NodeId> {
         let (op, mut constants) = Self::noise_option(function, options.get("noise"))?;
+        let creased = match op {
+            Op::CellularNoise => true,
+            Op::SparseNoise | Op::SpotNoise => constants[2] == Kernel::Linear.number(),
+            _ => false,
+        };
+        if creased {
+            return refuse(
+                format!("`{function}` wants a smooth noise: this one's gradient jumps"),
+                "simplex, sparse, wavelet and the gradient and value noises are smooth",
+            );
+        }
         if let Some(key) = options.get("key") {
             constants[0] = Self::constant(&format!("{function}: key"), key)?;
         }

@@ -254,8 +254,9 @@ fn usage(name: &str) -> String {
         "sea" => "sea(p, #{size: 256, spacing: 1, wind: 10})",
         "midpoint_terrain" => "midpoint_terrain(p, #{levels: 8, width: 1000, hurst: 0.8})",
         "cellular" => "cellular(p, #{order: 1, norm: 2, key: 3})",
+        "spot" => "spot(p, #{stretch: 3, variety: 0.5, axis: [1, 0, 0]})",
         "sparse" => "sparse(p, #{nodes: 2, kernel: \"quintic\", key: 3})",
-        "simplex" | "gradient_noise" | "value_noise" | "value_gradient_noise" => {
+        "simplex" | "wavelet" | "gradient_noise" | "value_noise" | "value_gradient_noise" => {
             return format!("it is used like {name}(p) or {name}(p, key)");
         }
         "gradient" => "gradient(p, #{noise: \"simplex\", key: 3})",

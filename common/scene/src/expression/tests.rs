@@ -285,6 +285,8 @@ fn noises_take_options() {
         ),
         ("sparse(p, #{nodes: 2, kernel: \"lewis\"})", "sparse(p)"),
         ("sparse(p, #{scatter: \"disc\"})", "sparse(p)"),
+        ("spot(p, #{stretch: 3, axis: [1, 0, 0]})", "spot(p)"),
+        ("wavelet(p, 2)", "wavelet(p)"),
         ("fbm(p, #{noise: \"cellular\"})", "cascade(p)"),
         (
             "ridged_multifractal(p, #{noise: #{kind: \"sparse\", nodes: 2}})",
@@ -434,7 +436,7 @@ fn mistakes_in_noises_have_sentences() {
         ),
         (
             "gradient(p, #{noise: \"cellular\"}).x",
-            "`noise_gradient` wants a noise whose gradient is continuous, not 84",
+            "`gradient` wants a smooth noise: this one's gradient jumps",
             None,
         ),
         (
