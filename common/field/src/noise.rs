@@ -5,7 +5,7 @@
 //! modulo 2³² and every random number is a hash of key and cell: a noise repeats every 4,294,967,296 cells.
 //! What each noise can reach, and how steeply, stands in its file as constants that its tests prove or search.
 //!
-//! [`gradient`] noise is the default and has loops of its own; the others share [`batch`].
+//! [`gradient`] noise is the default and has loops of its own; the others share `batch`.
 
 pub(crate) mod batch;
 pub mod cellular;

@@ -1,6 +1,6 @@
 //! Noises whose nodes are the corners of a cubic lattice: gradient, value and value-gradient, thesis §4.3.
 //!
-//! Written over any [`Real`], so that they have Hessians (4.10b) too. Gradient noise is here once more, equal to
+//! Written over any `Real`, so that they have Hessians (4.10b) too. Gradient noise is here once more, equal to
 //! its own file to the bit; that one is faster.
 
 use super::gradient::{FIRST, Lattice, THIRD, corners};

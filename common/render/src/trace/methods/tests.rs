@@ -393,9 +393,9 @@ fn a_search_without_end_is_given_up() {
     assert!(tally.evaluations() < super::EVALUATIONS_MAX + 10);
 }
 
-/// 100,000 rays at one surface, each by one method, on two threads.
+/// 12,000 rays at one surface, each by one method, on two threads.
 fn many(which: usize) {
-    const RAYS: u32 = 100_000;
+    const RAYS: u32 = 12_000;
     let surface = &surfaces()[which];
     let seen = Seen::default();
     std::thread::scope(|scope| {
@@ -415,7 +415,7 @@ fn many(which: usize) {
     });
     assert_eq!(count(&seen.rays), u64::from(RAYS));
     assert!(
-        count(&seen.open_first) < 2_000,
+        count(&seen.open_first) < u64::from(RAYS / 50),
         "{}: {seen:?}",
         surface.name
     );
@@ -424,36 +424,36 @@ fn many(which: usize) {
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_5_11() {
+fn no_miss_in_12_000_rays_at_5_11() {
     many(0);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_5_29() {
+fn no_miss_in_12_000_rays_at_5_29() {
     many(1);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_fbm() {
+fn no_miss_in_12_000_rays_at_fbm() {
     many(2);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_ridges() {
+fn no_miss_in_12_000_rays_at_ridges() {
     many(3);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_balls() {
+fn no_miss_in_12_000_rays_at_balls() {
     many(4);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_100_000_rays_at_waves() {
+fn no_miss_in_12_000_rays_at_waves() {
     many(5);
 }
