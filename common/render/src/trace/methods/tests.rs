@@ -308,9 +308,15 @@ fn compare(surface: &Surface, methods: &[Box<dyn Method>], i: u32, seen: &Seen) 
         if !open && !close {
             let roots = method.search(&along, SPAN, Wanted::All, &mut tally);
             let roots = &roots[usize::from(begins)..];
-            assert_eq!(roots.len(), all.len(), "{}: {roots:?} {all:?}", told());
-            for (root, exact) in roots.iter().zip(&all) {
-                assert!(near(*root, exact), "{}: {root} for {exact:?}", told());
+            // A root that is nearly double may be told more than once within its own rounding, but none
+            // may be missed and none may be where the reference has none.
+            for exact in &all {
+                let found = roots.iter().any(|root| near(*root, exact));
+                assert!(found, "{}: {exact:?} is not in {roots:?}", told());
+            }
+            for root in roots {
+                let real = all.iter().any(|exact| near(*root, exact));
+                assert!(real, "{}: {root} is not in {all:?}", told());
             }
         }
         assert_eq!(tally.abandoned, 0, "{}", told());
