@@ -421,7 +421,7 @@ fn many(which: usize) {
     });
     assert_eq!(count(&seen.rays), u64::from(RAYS));
     assert!(
-        count(&seen.open_first) < u64::from(RAYS / 50),
+        count(&seen.open_first) < u64::from(RAYS / 40),
         "{}: {seen:?}",
         surface.name
     );
