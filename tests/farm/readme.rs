@@ -69,3 +69,17 @@ fn its_files_are_there() {
         }
     }
 }
+
+#[test]
+fn its_scenes_are_right() {
+    let (place, readme) = (Place::new(), readme());
+    let mut count = 0;
+    for block in readme.split("```toml").skip(1) {
+        let block = block.split("```").next().unwrap();
+        let camera = "[camera.fixed]\neye = [6371100, 0, 0]\ntarget = [6371000, 100, 0]\n";
+        place.write("readme.toml", format!("{camera}{block}"));
+        place.flyby(["scene", "check", "readme.toml"]).ok();
+        count += 1;
+    }
+    assert!(count > 0, "the README shows a scene");
+}

@@ -54,6 +54,12 @@ fn parsing(error: &ParseErrorType) -> (String, Option<String>) {
         ParseErrorType::BadInput(LexError::ImproperSymbol(symbol, _))
         | ParseErrorType::UnknownOperator(symbol)
         | ParseErrorType::Reserved(symbol) => symbol.as_str(),
+        ParseErrorType::BadInput(LexError::MalformedChar(_)) => {
+            return (
+                "text stands between double quotes".into(),
+                Some("write \"ridged\", in a TOML text that begins with ' or \"\"\"".into()),
+            );
+        }
         ParseErrorType::ExprTooDeep => {
             return (
                 "the expression is nested too deeply".into(),

@@ -470,6 +470,11 @@ fn what_rhai_gets_silently_wrong_is_refused_with_a_way_out() {
     for (text, message, help) in [
         ("2^3*p.x", "`^` is not a power", Some("write 2**3")),
         (
+            "altitude2(p, #{basis: 'ridged'})",
+            "text stands between double quotes",
+            Some("write \"ridged\", in a TOML text that begins with ' or \"\"\""),
+        ),
+        (
             "if p.x == 0 { 1 } else { 2 }",
             "a field cannot be compared with `==`: it differs from point to point",
             select,
