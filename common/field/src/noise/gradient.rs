@@ -109,6 +109,22 @@ fn kernel(hash: u32, x: f32, y: f32, z: f32) -> f32 {
     flip(a, hash << 13) + flip(b, hash << 14)
 }
 
+/// The [`kernel`] of each of a cell's corners at an offset in it; x runs fastest.
+#[inline(always)]
+fn kernels(h: [u32; 8], [x, y, z]: [f32; 3]) -> [f32; 8] {
+    let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
+    [
+        kernel(h[0], x, y, z),
+        kernel(h[1], x1, y, z),
+        kernel(h[2], x, y1, z),
+        kernel(h[3], x1, y1, z),
+        kernel(h[4], x, y, z1),
+        kernel(h[5], x1, y, z1),
+        kernel(h[6], x, y1, z1),
+        kernel(h[7], x1, y1, z1),
+    ]
+}
+
 /// `value` with its sign turned where the top bit of `sign` is set.
 #[inline(always)]
 fn flip(value: f32, sign: u32) -> f32 {
@@ -161,10 +177,9 @@ pub(crate) fn corners(lattice: Lattice, [x, y, z]: [u32; 3]) -> [u32; 8] {
 pub(crate) fn value(h: [u32; 8], [x, y, z]: [f32; 3]) -> f32 {
     let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
     let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
-    let a = lerp(u, kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
-    let b = lerp(u, kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
-    let c = lerp(u, kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
-    let d = lerp(u, kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
+    let [a0, a1, b0, b1, c0, c1, d0, d1] = kernels(h, [x, y, z]);
+    let (a, b) = (lerp(u, a0, a1), lerp(u, b0, b1));
+    let (c, d) = (lerp(u, c0, c1), lerp(u, d0, d1));
     lerp(w, lerp(v, a, b), lerp(v, c, d))
 }
 
@@ -174,16 +189,9 @@ pub(crate) fn value(h: [u32; 8], [x, y, z]: [f32; 3]) -> f32 {
 pub(crate) fn value_bend(h: [u32; 8], [x, y, z]: [f32; 3]) -> (f32, [f32; 3]) {
     let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
     let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
-    let (a0, a1) = (kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
-    let (b0, b1) = (kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
-    let (c0, c1) = (kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
-    let (d0, d1) = (kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
-    let (a, b, c, d) = (
-        lerp(u, a0, a1),
-        lerp(u, b0, b1),
-        lerp(u, c0, c1),
-        lerp(u, d0, d1),
-    );
+    let [a0, a1, b0, b1, c0, c1, d0, d1] = kernels(h, [x, y, z]);
+    let (a, b) = (lerp(u, a0, a1), lerp(u, b0, b1));
+    let (c, d) = (lerp(u, c0, c1), lerp(u, d0, d1));
     let (near, far) = (lerp(v, a, b), lerp(v, c, d));
     let along_x = lerp(w, lerp(v, a1 - a0, b1 - b0), lerp(v, c1 - c0, d1 - d0));
     let along_y = lerp(w, b - a, d - c);
@@ -203,16 +211,9 @@ pub(crate) fn value_bend(h: [u32; 8], [x, y, z]: [f32; 3]) -> (f32, [f32; 3]) {
 pub(crate) fn value_along(h: [u32; 8], [x, y, z]: [f32; 3], [p, q, r]: [f32; 3]) -> (f32, f32) {
     let (x1, y1, z1) = (x - 1.0, y - 1.0, z - 1.0);
     let (u, v, w) = (fade(x, x1), fade(y, y1), fade(z, z1));
-    let (a0, a1) = (kernel(h[0], x, y, z), kernel(h[1], x1, y, z));
-    let (b0, b1) = (kernel(h[2], x, y1, z), kernel(h[3], x1, y1, z));
-    let (c0, c1) = (kernel(h[4], x, y, z1), kernel(h[5], x1, y, z1));
-    let (d0, d1) = (kernel(h[6], x, y1, z1), kernel(h[7], x1, y1, z1));
-    let (a, b, c, d) = (
-        lerp(u, a0, a1),
-        lerp(u, b0, b1),
-        lerp(u, c0, c1),
-        lerp(u, d0, d1),
-    );
+    let [a0, a1, b0, b1, c0, c1, d0, d1] = kernels(h, [x, y, z]);
+    let (a, b) = (lerp(u, a0, a1), lerp(u, b0, b1));
+    let (c, d) = (lerp(u, c0, c1), lerp(u, d0, d1));
     let (near, far) = (lerp(v, a, b), lerp(v, c, d));
     let us = fade_slope(x, x1) * p;
     let (vs, ws) = (fade_slope(y, y1) * q, fade_slope(z, z1) * r);

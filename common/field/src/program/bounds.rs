@@ -9,13 +9,13 @@
 //! All bounds are of what evaluation computes: ranges enclose computed values by induction, and each
 //! operation adds twice its rounding error to the change.
 
+mod cascade;
+
 use crate::arithmetic::{Binary, Unary};
-use crate::cascade::{self, Cascade, Model, Octave};
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::{Interval, larger, smaller};
 use crate::noise::{self, Noise};
-use crate::op::Basis;
 use crate::program::fold;
 use crate::program::plan::{Act, Plan, Step};
 use crate::shape::{Shape, Within};
@@ -26,12 +26,6 @@ const ROUNDING: f64 = 2.0 * f64::EPSILON;
 
 /// Twice the error of an offset rounded to f32 in three coordinates: 2 · √3 · 2⁻²⁵.
 const OFFSET_ROUNDING: f64 = 1.04e-7;
-
-/// How far the norm of rⁱ Rⁱ⁺¹ may be above rⁱ, relatively.
-const STRETCH: f64 = 1.0 + 1e-12;
-
-/// Twice the error of `cascade::log2`, and room for its rounding.
-const LOG_ROUNDING: f64 = 3e-10;
 
 /// offset + slope · distance.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -510,144 +504,6 @@ impl<'a> Pass<'a> {
             .plus(Change::new(2.0 * noise.rounding(), 0.0));
         self.limited(noise.range(), change)
     }
-
-    fn cascade(&mut self, cascade: &Cascade, at: &Bound) -> Bound {
-        let zero = Interval::point(0.0);
-        let mut total = Part {
-            range: zero,
-            change: Change::NONE,
-        };
-        let mut rest = total;
-        for (i, octave) in cascade.octaves.iter().enumerate() {
-            let weight = self.weight(cascade, i);
-            if weight.range.high <= 0.0 {
-                break;
-            }
-            let noise = Part {
-                range: octave.noise.as_ref().map_or(NOISE, Noise::range),
-                change: self.octave(octave, at),
-            };
-            let amplitude = octave.amplitude;
-            match cascade.model {
-                Model::Sum(basis) => {
-                    let octave = self.times(shaped(basis, noise), weight).scaled(amplitude);
-                    total = self.plus(total, octave);
-                }
-                Model::AltitudeOne { basis, xi } => {
-                    let octave = self
-                        .times(shaped(basis, noise).raised(xi), weight)
-                        .scaled(amplitude);
-                    total = if i == 0 {
-                        octave
-                    } else {
-                        self.times(total, octave.raised(1.0))
-                    };
-                }
-                Model::AltitudeTwo { basis, xi } => {
-                    let raised = shaped(basis, noise).raised(xi).scaled(amplitude);
-                    if i == 0 {
-                        total = self.times(raised, weight);
-                        rest.range = Interval::point(1.0);
-                    } else {
-                        rest = self.clamped(rest, raised);
-                        let octave = self.times(rest, weight);
-                        total = self.plus(total, octave);
-                    }
-                }
-                Model::Ridged { offset, gain } => {
-                    let ridge = ridge(offset, noise);
-                    rest = if i == 0 {
-                        ridge
-                    } else {
-                        let held = self.clamped(rest.scaled(gain), ONE);
-                        self.times(held, ridge)
-                    };
-                    let octave = self.times(rest, weight).scaled(amplitude);
-                    total = self.plus(total, octave);
-                }
-            }
-        }
-        self.scalar(total.range, total.change)
-    }
-
-    /// The change of one octave's noise, the rounding of its coordinates included.
-    fn octave(&mut self, octave: &Octave, at: &Bound) -> Change {
-        let frequency = octave.frequency * STRETCH;
-        let place = at
-            .change()
-            .times(frequency)
-            .rounded(at.magnitude() * frequency + 1.0, 8.0);
-        match &octave.noise {
-            None => self.noise(place),
-            // Skewing at most doubles the coordinates, and their rounding.
-            Some(noise) if noise.is_skewed() => {
-                let more = at.magnitude() * frequency * 2.0 + 2.0;
-                self.any_noise(noise, place.rounded(more, 8.0))
-            }
-            Some(noise) => self.any_noise(noise, place),
-        }
-    }
-
-    /// The level-of-detail weight of octave `i`. It changes with the footprint, where it is neither 0 nor 1.
-    pub(crate) fn weight(&mut self, cascade: &Cascade, i: usize) -> Part {
-        let Some(detail) = cascade.detail else {
-            return ONE;
-        };
-        let i = cascade::index(i);
-        let Interval { low, high } = self.around.footprint;
-        let slack = LOG_ROUNDING * detail.per_octave;
-        let range = Interval::new(
-            cascade::weight(cascade.depth(high) - slack, i),
-            cascade::weight(cascade.depth(low) + slack, i),
-        );
-        if range.width() == 0.0 {
-            return Part {
-                range,
-                change: Change::NONE,
-            };
-        }
-        // Below this footprint the weight is 1.
-        let full = libm::exp2(-detail.detail - (i + detail.first) / detail.per_octave)
-            / detail.scale
-            * (1.0 - 1e-9);
-        let per_metre = detail.per_octave / (std::f64::consts::LN_2 * larger(low, full));
-        let change = Change::new(slack, self.around.footprint_slope * per_metre);
-        Part {
-            range,
-            change: self.limited(range, change),
-        }
-    }
-
-    fn plus(&mut self, a: Part, b: Part) -> Part {
-        let range = a.range.add(b.range);
-        let change = a.change.plus(b.change).rounded(range.magnitude(), 1.0);
-        Part {
-            range,
-            change: self.limited(range, change),
-        }
-    }
-
-    fn times(&mut self, a: Part, b: Part) -> Part {
-        let range = a.range.mul(b.range);
-        let change = a
-            .change
-            .times(b.range.magnitude())
-            .plus(b.change.times(a.range.magnitude()));
-        Part {
-            range,
-            change: self.limited(range, change.rounded(range.magnitude(), 2.0)),
-        }
-    }
-
-    /// The product, held between 0 and 1.
-    fn clamped(&mut self, a: Part, b: Part) -> Part {
-        let Part { range, change } = self.times(a, b);
-        let range = range.clamp(0.0, 1.0);
-        Part {
-            range,
-            change: self.limited(range, change),
-        }
-    }
 }
 
 /// The change of the argument of a noise, the rounding of its skewing included.
@@ -662,64 +518,6 @@ fn skewed(noise: &Noise, at: &Bound, operations: f64) -> Change {
 
 /// All values of the noise; its supremum is further below than it rounds.
 pub(crate) const NOISE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
-
-const ONE: Part = Part {
-    range: Interval::point(1.0),
-    change: Change::NONE,
-};
-
-/// A number on its way through a cascade.
-#[derive(Clone, Copy)]
-pub(crate) struct Part {
-    pub(crate) range: Interval,
-    change: Change,
-}
-
-impl Part {
-    fn scaled(self, factor: f64) -> Self {
-        let range = self.range.mul(Interval::point(factor));
-        Self {
-            range,
-            change: self
-                .change
-                .times(factor.abs())
-                .rounded(range.magnitude(), 1.0),
-        }
-    }
-
-    fn raised(self, by: f64) -> Self {
-        let range = self.range.add(Interval::point(by));
-        Self {
-            range,
-            change: self.change.rounded(range.magnitude(), 1.0),
-        }
-    }
-}
-
-fn shaped(basis: Basis, noise: Part) -> Part {
-    match basis {
-        Basis::Plain => noise,
-        Basis::Absolute => Part {
-            range: noise.range.abs(),
-            change: noise.change,
-        },
-        Basis::Ridged => ridge(1.0, noise),
-    }
-}
-
-/// (offset − |n|)²: |s² − t²| = |s + t||s − t|.
-fn ridge(offset: f64, noise: Part) -> Part {
-    let base = Interval::point(offset).sub(noise.range.abs());
-    let range = base.square();
-    let change = noise
-        .change
-        .rounded(base.magnitude(), 1.0)
-        .times(2.0 * base.magnitude());
-    Part {
-        range,
-        change: change.rounded(range.magnitude(), 1.0),
-    }
-}
 
 /// The change of a product.
 fn multiplied(a: &Bound, b: &Bound) -> Change {
