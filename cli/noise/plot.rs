@@ -5,6 +5,7 @@ use std::error::Error as StdError;
 use std::ops::Range;
 
 use plotters::coord::Shift;
+use plotters::coord::ranged1d::ValueFormatter;
 use plotters::prelude::*;
 
 use super::measure::{Covariance, Plane};
@@ -76,42 +77,12 @@ pub(crate) fn curves(words: Words, axis: Axis, curves: &[Curve]) -> Drawn {
         match axis {
             Axis::Even => {
                 let mut chart = builder.build_cartesian_2d(0.0..x.end, y.clone())?;
-                chart
-                    .configure_mesh()
-                    .label_style(LABELS)
-                    .axis_desc_style(LABELS)
-                    .x_desc(words.x)
-                    .y_desc(words.y)
-                    .draw()?;
-                for (number, curve) in curves.iter().enumerate() {
-                    let style = style(number);
-                    let points = curve.points.iter().copied();
-                    chart
-                        .draw_series(LineSeries::new(points, style))?
-                        .label(&curve.label)
-                        .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-                }
-                legend(&mut chart)?;
+                lines(&mut chart, words, curves)?;
             }
             Axis::Logarithmic => {
                 let mut chart =
                     builder.build_cartesian_2d((x.start..x.end).log_scale(), y.clone())?;
-                chart
-                    .configure_mesh()
-                    .label_style(LABELS)
-                    .axis_desc_style(LABELS)
-                    .x_desc(words.x)
-                    .y_desc(words.y)
-                    .draw()?;
-                for (number, curve) in curves.iter().enumerate() {
-                    let style = style(number);
-                    let points = curve.points.iter().copied();
-                    chart
-                        .draw_series(LineSeries::new(points, style))?
-                        .label(&curve.label)
-                        .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
-                }
-                legend(&mut chart)?;
+                lines(&mut chart, words, curves)?;
             }
         }
         Ok(())
@@ -122,14 +93,31 @@ fn style(number: usize) -> ShapeStyle {
     Palette99::pick(number).stroke_width(2)
 }
 
-fn legend<'a, 'b, X, Y>(
+/// The axes' words, the curves and their legend, whatever the axes' scales.
+fn lines<'a, 'b: 'a, X, Y>(
     chart: &mut ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>,
+    words: Words,
+    curves: &[Curve],
 ) -> Result<(), Box<dyn StdError + Send + Sync>>
 where
-    'b: 'a,
-    X: Ranged<ValueType = f64>,
-    Y: Ranged<ValueType = f64>,
+    X: Ranged<ValueType = f64> + ValueFormatter<f64>,
+    Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
 {
+    chart
+        .configure_mesh()
+        .label_style(LABELS)
+        .axis_desc_style(LABELS)
+        .x_desc(words.x)
+        .y_desc(words.y)
+        .draw()?;
+    for (number, curve) in curves.iter().enumerate() {
+        let style = style(number);
+        let points = curve.points.iter().copied();
+        chart
+            .draw_series(LineSeries::new(points, style))?
+            .label(&curve.label)
+            .legend(move |(x, y)| PathElement::new([(x, y), (x + 18, y)], style));
+    }
     chart
         .configure_series_labels()
         .label_font(LABELS)
