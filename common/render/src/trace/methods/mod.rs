@@ -15,8 +15,8 @@
 //!
 //! **What is guaranteed.** A root is a change of side: f > 0 is outside, f ≤ 0 inside. A method that is asked for
 //! crossings misses none of which either side is longer than its ε; 0 ∈ G(T) alone proves none (fig. 5.8, mended: ERRATA
-//! row 1900), so that an interval shorter than ε counts if its ends are on different sides. The test
-//! `tests` compares every method with bisection in outward-rounded intervals.
+//! row 1900), so that an interval shorter than ε counts if its ends are on different sides. Of all roots, subdivision
+//! leaves out two that are less than ε apart. The test `tests` compares every method with bisection in outward-rounded intervals.
 
 mod along;
 mod mitchell;

@@ -105,6 +105,7 @@ pub(super) fn subdivide(
             return roots;
         }
     }
+    let started = roots.len();
     let mut stack = vec![span];
     while let Some(t) = stack.pop() {
         if tally.spent(begun) {
@@ -116,7 +117,7 @@ pub(super) fn subdivide(
         let atom = !(held.low < middle && middle < held.high);
         if t.high - t.low < grain.epsilon || atom {
             if grain.hit == Hit::Converged || crosses(ray, t, tally) {
-                roots.push(t.low);
+                add(&mut roots, started, t.low, grain);
                 if wanted == Wanted::First {
                     break;
                 }
@@ -128,6 +129,19 @@ pub(super) fn subdivide(
         stack.push(Interval::new(held.low, middle));
     }
     roots
+}
+
+/// Adds a root that comes after those that are there, of which `started` are no crossings.
+///
+/// Two crossings less than ε apart are not told: a surface that rounding makes rough changes its side three
+/// times where it does once, and the two that go too far and come back mean nothing.
+fn add(roots: &mut Vec<f64>, started: usize, root: f64, grain: Grain) {
+    let last = roots[started..].last();
+    if grain.hit == Hit::Crossing && last.is_some_and(|last| root - last < grain.epsilon) {
+        roots.pop();
+    } else {
+        roots.push(root);
+    }
 }
 
 /// Whether the span begins in the solid, which counts as a crossing there.

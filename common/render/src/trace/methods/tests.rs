@@ -97,7 +97,8 @@ fn surfaces() -> Vec<Surface> {
             }
             sum
         }),
-        surface("thesis eq. (5.29)", None, NOISY, |f| {
+        // Slits along the noise's zeros, steep on both sides: there its rounding moves a root by less than a micrometre.
+        surface("thesis eq. (5.29)", None, 1e-6, |f| {
             let p = f.scaled(6.0);
             let noise = f.op(Op::Noise, &[p], &[0.0]);
             let noise = f.op(Op::Abs, &[noise], &[]);
@@ -308,15 +309,9 @@ fn compare(surface: &Surface, methods: &[Box<dyn Method>], i: u32, seen: &Seen) 
         if !open && !close {
             let roots = method.search(&along, SPAN, Wanted::All, &mut tally);
             let roots = &roots[usize::from(begins)..];
-            // A root that is nearly double may be told more than once within its own rounding, but none
-            // may be missed and none may be where the reference has none.
-            for exact in &all {
-                let found = roots.iter().any(|root| near(*root, exact));
-                assert!(found, "{}: {exact:?} is not in {roots:?}", told());
-            }
-            for root in roots {
-                let real = all.iter().any(|exact| near(*root, exact));
-                assert!(real, "{}: {root} is not in {all:?}", told());
+            assert_eq!(roots.len(), all.len(), "{}: {roots:?} {all:?}", told());
+            for (root, exact) in roots.iter().zip(&all) {
+                assert!(near(*root, exact), "{}: {root} for {exact:?}", told());
             }
         }
         assert_eq!(tally.abandoned, 0, "{}", told());
@@ -399,9 +394,9 @@ fn a_search_without_end_is_given_up() {
     assert!(tally.evaluations() < super::EVALUATIONS_MAX + 10);
 }
 
-/// 12,000 rays at one surface, each by one method, on two threads.
+/// 100,000 rays at one surface, each by one method, on two threads.
 fn many(which: usize) {
-    const RAYS: u32 = 12_000;
+    const RAYS: u32 = 100_000;
     let surface = &surfaces()[which];
     let seen = Seen::default();
     std::thread::scope(|scope| {
@@ -421,7 +416,7 @@ fn many(which: usize) {
     });
     assert_eq!(count(&seen.rays), u64::from(RAYS));
     assert!(
-        count(&seen.open_first) < u64::from(RAYS / 40),
+        count(&seen.open_first) < 2_000,
         "{}: {seen:?}",
         surface.name
     );
@@ -430,36 +425,36 @@ fn many(which: usize) {
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_5_11() {
+fn no_miss_in_100_000_rays_at_5_11() {
     many(0);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_5_29() {
+fn no_miss_in_100_000_rays_at_5_29() {
     many(1);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_fbm() {
+fn no_miss_in_100_000_rays_at_fbm() {
     many(2);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_ridges() {
+fn no_miss_in_100_000_rays_at_ridges() {
     many(3);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_balls() {
+fn no_miss_in_100_000_rays_at_balls() {
     many(4);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
-fn no_miss_in_12_000_rays_at_waves() {
+fn no_miss_in_100_000_rays_at_waves() {
     many(5);
 }
