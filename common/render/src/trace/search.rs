@@ -7,6 +7,8 @@
 //! bound of the field's change, which is the better far from the surface, or by that of its fall below
 //! the tangent ([`field::Taylor`]), which is the better close to it.
 
+use core::sync::atomic::Ordering;
+
 use field::{BATCH, Scratch};
 
 use super::batch::{Batch, Lanes, Paths};
@@ -18,6 +20,7 @@ use super::grid::Steps;
 use super::polish::Found;
 use super::surface::Surface;
 use super::tracer::{Goal, Hit, Ray, Results, Wanted};
+use crate::error::Cancelled;
 
 /// The share of the way to where both ends of a step would just meet, if the field went on as its
 /// tangent does. Steps reach there: up to about twice as far as proven.
@@ -26,9 +29,9 @@ const FORESIGHT: f64 = 0.9;
 /// From where on the way to the tangent's root counts as nearly proven: steps then go to the root itself.
 const NEARLY: f64 = 0.6;
 
-/// Most evaluations along one ray. A ray that is still not done then runs along the
-/// surface within a step of it, and counts as meeting it where it stands.
-const STEPS_MAX: f64 = 16_384.0;
+/// Most evaluations along one ray: more than a ray's grid has points within any scene that can be rendered in
+/// a day, so that no answer depends on where a search began. A ray that still is not done counts as a hit where it stands.
+const STEPS_MAX: f64 = 4_194_304.0;
 
 /// Memory in which rays are searched.
 #[derive(Default)]
@@ -106,6 +109,7 @@ impl Search {
             surface,
             goal,
             rays,
+            cancel,
         }: Wanted<'_>,
         spans: &[Span],
         Results {
@@ -114,7 +118,7 @@ impl Search {
             hits,
         }: Results<'_>,
         mut found: impl FnMut(Found, Results<'_>),
-    ) {
+    ) -> Result<(), Cancelled> {
         let mut waiting = spans.iter();
         loop {
             while self.rays.len() < BATCH {
@@ -125,7 +129,11 @@ impl Search {
             }
             let n = self.rays.len();
             if n == 0 {
-                return;
+                return Ok(());
+            }
+            if cancel.load(Ordering::Relaxed) {
+                self.rays.clear();
+                return Err(Cancelled);
             }
             self.step(surface, n, scratch);
             counts.evaluations += n as u64;
@@ -318,14 +326,14 @@ impl Rows {
         let rate = 1.0 + if fall > -0.5 { fall } else { -0.5 };
         let meet = FORESIGHT * (ahead + behind) / rate;
         let root = proof / -slope;
-        let reach = if (slope < 0.0) & (ahead > NEARLY * root) {
-            root
-        } else {
-            meet
-        };
         // Nothing proven, nothing foreseen: then it may not be a number.
-        let reach = if reach > ahead { reach } else { ahead };
-        let target = steps.from(at + reach);
+        let meet = if meet > ahead { meet } else { ahead };
+        // The last point within reach: one beyond would not be covered. Past the root it need not be.
+        let target = if (slope < 0.0) & (ahead > NEARLY * root) {
+            steps.from(at + root)
+        } else {
+            steps.before(steps.from(at + meet))
+        };
         let most = if inside < f64::INFINITY {
             steps.before(inside)
         } else {

@@ -68,6 +68,8 @@ pub(crate) struct Wanted<'a> {
     pub(crate) surface: &'a Surface,
     pub(crate) goal: Goal,
     pub(crate) rays: &'a [Ray],
+    /// Whether to stop.
+    pub(crate) cancel: &'a AtomicBool,
 }
 
 /// Where the stages put what they find, and the memory of their evaluations.
@@ -109,19 +111,24 @@ impl Tracer {
             }
             let first = hits.len();
             hits.resize(first + rays.len(), Hit::None);
-            self.trace_together(surface, goal, rays, counts, &mut hits[first..]);
+            let wanted = Wanted {
+                surface,
+                goal,
+                rays,
+                cancel,
+            };
+            self.trace_together(wanted, counts, &mut hits[first..])?;
         }
         Ok(())
     }
 
     fn trace_together(
         &mut self,
-        surface: &Surface,
-        goal: Goal,
-        rays: &[Ray],
+        wanted: Wanted<'_>,
         counts: &mut Counts,
         hits: &mut [Hit],
-    ) {
+    ) -> Result<(), Cancelled> {
+        let Wanted { surface, rays, .. } = wanted;
         let Self {
             spans,
             bundles,
@@ -139,11 +146,6 @@ impl Tracer {
             })
         }));
         bundles.approach(surface, rays, spans, scratch, counts);
-        let wanted = Wanted {
-            surface,
-            goal,
-            rays,
-        };
         let results = Results {
             scratch,
             counts,
@@ -151,12 +153,13 @@ impl Tracer {
         };
         search.run(wanted, spans, results, |found, results| {
             polish.push(found, wanted, results);
-        });
+        })?;
         let results = Results {
             scratch,
             counts,
             hits,
         };
         polish.run(wanted, results);
+        Ok(())
     }
 }
