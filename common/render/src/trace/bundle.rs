@@ -52,6 +52,8 @@ struct Rows {
     offset: Lanes,
     slope: Lanes,
     reach: Lanes,
+    value: Lanes,
+    growth: Lanes,
     ahead: Lanes,
 }
 
@@ -64,6 +66,8 @@ impl Default for Rows {
             offset: [0.0; BATCH],
             slope: [0.0; BATCH],
             reach: [0.0; BATCH],
+            value: [0.0; BATCH],
+            growth: [0.0; BATCH],
             ahead: [0.0; BATCH],
         }
     }
@@ -202,11 +206,11 @@ impl Rows {
     fn advance(&mut self, n: usize, known: Known, paths: &Paths, batch: &Batch) {
         assert!(n <= BATCH);
         let across = if known == Known::Nothing { 0.0 } else { 1.0 };
+        self.value = batch.value;
+        known.growths(n, &batch.place, &paths.direction, &mut self.growth);
         for i in 0..n {
-            let part = |axis: usize| (batch.place[axis][i], paths.direction[axis][i]);
-            let growth = known.growth_at([part(0), part(1), part(2)]);
-            let value = batch.value[i];
-            let value = if value.is_finite() { value } else { 0.0 };
+            let (value, growth) = (self.value[i], self.growth[i]);
+            let value = if value < f64::INFINITY { value } else { 0.0 };
             let slope = self.slope[i];
             let radius = self.radius[i] + self.spread[i] * self.t[i];
             let rest = value - self.offset[i] - (slope + across) * radius;

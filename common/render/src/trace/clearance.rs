@@ -1,9 +1,10 @@
 //! How far a ray may go from a place where the field has a known value.
 
-use field::{Interval, Modulus, Program, Region, Surroundings, Taylor};
+use field::{BATCH, Interval, Modulus, Program, Region, Surroundings, Taylor};
 use glam::DVec3;
 use scene::description::{Bound, Seed};
 
+use super::batch::Lanes;
 use super::grid::FAR;
 use crate::view::Footprint;
 
@@ -42,6 +43,29 @@ impl Known {
                 let along = x * dx + y * dy + z * dz;
                 let size = (x * x + y * y + z * z).sqrt();
                 if size > 0.0 { along / size } else { -1.0 }
+            }
+        }
+    }
+
+    /// [`Self::growth_at`] for the first `n` lanes.
+    #[inline(always)]
+    pub(crate) fn growths(
+        self,
+        n: usize,
+        [x, y, z]: &[Lanes; 3],
+        [dx, dy, dz]: &[Lanes; 3],
+        growth: &mut Lanes,
+    ) {
+        assert!(n <= BATCH);
+        // One loop per case, so that none of them decides anything.
+        match self {
+            Self::Nothing => growth[..n].fill(0.0),
+            Self::Height => growth[..n].copy_from_slice(&dz[..n]),
+            Self::Radius => {
+                for i in 0..n {
+                    let parts = [(x[i], dx[i]), (y[i], dy[i]), (z[i], dz[i])];
+                    growth[i] = Self::Radius.growth_at(parts);
+                }
             }
         }
     }

@@ -4,6 +4,8 @@
 //! coarser with distance just as a pixel's footprint does, and depends on
 //! nothing but its own three numbers: where a search starts cannot be seen.
 
+use field::BATCH;
+
 /// Bits of an f64's mantissa.
 const MANTISSA: u32 = 52;
 
@@ -84,6 +86,48 @@ impl Grid {
             base: self.base,
             last: (1 << self.shift) - 1,
             origin: self.origin,
+        }
+    }
+}
+
+/// The grids of a batch's lanes: structure of arrays.
+#[derive(Clone, Debug)]
+pub(crate) struct StepRows {
+    base: [u64; BATCH],
+    last: [u64; BATCH],
+    origin: [f64; BATCH],
+}
+
+impl Default for StepRows {
+    fn default() -> Self {
+        Self {
+            base: [0; BATCH],
+            last: [0; BATCH],
+            origin: [0.0; BATCH],
+        }
+    }
+}
+
+impl StepRows {
+    /// Puts a grid into a lane.
+    pub(crate) fn set(&mut self, lane: usize, steps: Steps) {
+        self.base[lane] = steps.base;
+        self.last[lane] = steps.last;
+        self.origin[lane] = steps.origin;
+    }
+
+    /// Copies one lane's grid into another.
+    pub(crate) fn copy(&mut self, from: usize, to: usize) {
+        self.set(to, self.at(from));
+    }
+
+    /// A lane's grid.
+    #[inline(always)]
+    pub(crate) fn at(&self, lane: usize) -> Steps {
+        Steps {
+            base: self.base[lane],
+            last: self.last[lane],
+            origin: self.origin[lane],
         }
     }
 }
