@@ -176,19 +176,33 @@ impl Cascade {
 /// What an octave leaves: the cascade so far, and what its model hands on.
 pub(crate) type Carried<T> = (T, T);
 
+/// An octave's level-of-detail weight: a number, or a range of them along a stretch of a ray.
+pub(crate) trait Weight<T>: Copy {
+    /// The octave times its amplitude and its weight; 0 where it has none.
+    fn weigh(self, octave: T, amplitude: f64) -> T;
+}
+
+impl<T: Number> Weight<T> for f64 {
+    #[inline(always)]
+    fn weigh(self, octave: T, amplitude: f64) -> T {
+        octave.times(self * amplitude).gate(self > 0.0)
+    }
+}
+
 /// An octave's place in its cascade at one point.
 #[derive(Clone, Copy)]
-pub(crate) struct Term {
+pub(crate) struct Term<W = f64> {
     /// Whether it is octave 0.
     pub(crate) first: bool,
     /// r^{−iH}.
     pub(crate) amplitude: f64,
     /// Its level-of-detail weight.
-    pub(crate) weight: f64,
+    pub(crate) weight: W,
 }
 
+/// What a basis makes of a noise.
 #[inline(always)]
-fn shape<T: Number>(basis: Basis, noise: T) -> T {
+pub(crate) fn shape<T: Number>(basis: Basis, noise: T) -> T {
     match basis {
         Basis::Plain => noise,
         Basis::Absolute => noise.abs(),
@@ -199,35 +213,33 @@ fn shape<T: Number>(basis: Basis, noise: T) -> T {
 /// (offset − |noise|)².
 #[inline(always)]
 fn ridge<T: Number>(offset: f64, noise: T) -> T {
-    let t = T::constant(offset).plus(noise.abs().times(-1.0));
+    let t = T::constant(offset).minus(noise.abs());
     t.square()
 }
 
 /// Adds one octave of a sum.
 #[inline(always)]
-pub(crate) fn sum<T: Number>(
+pub(crate) fn sum<T: Number, W: Weight<T>>(
     basis: Basis,
-    term: Term,
+    term: Term<W>,
     noise: T,
     (total, rest): Carried<T>,
 ) -> Carried<T> {
-    let octave = shape(basis, noise).times(term.weight * term.amplitude);
-    (total.plus(octave.gate(term.weight > 0.0)), rest)
+    let octave = term.weight.weigh(shape(basis, noise), term.amplitude);
+    (total.plus(octave), rest)
 }
 
 /// Adds one octave of the first altitude model.
 #[inline(always)]
-pub(crate) fn altitude_one<T: Number>(
+pub(crate) fn altitude_one<T: Number, W: Weight<T>>(
     basis: Basis,
     xi: f64,
-    term: Term,
+    term: Term<W>,
     noise: T,
     (total, rest): Carried<T>,
 ) -> Carried<T> {
     let raised = shape(basis, noise).plus(T::constant(xi));
-    let octave = raised
-        .times(term.weight * term.amplitude)
-        .gate(term.weight > 0.0);
+    let octave = term.weight.weigh(raised, term.amplitude);
     let total = if term.first {
         octave
     } else {
@@ -238,30 +250,29 @@ pub(crate) fn altitude_one<T: Number>(
 
 /// Adds one octave of the second altitude model; it hands on the weight w of eq. (3.45a).
 #[inline(always)]
-pub(crate) fn altitude_two<T: Number>(
+pub(crate) fn altitude_two<T: Number, W: Weight<T>>(
     basis: Basis,
     xi: f64,
-    term: Term,
+    term: Term<W>,
     noise: T,
     (total, rest): Carried<T>,
 ) -> Carried<T> {
     let raised = shape(basis, noise)
         .plus(T::constant(xi))
         .times(term.amplitude);
-    let live = term.weight > 0.0;
     if term.first {
-        return (raised.times(term.weight).gate(live), T::constant(1.0));
+        return (term.weight.weigh(raised, 1.0), T::constant(1.0));
     }
     let rest = rest.mul(raised).clamp01();
-    (total.plus(rest.clone().times(term.weight).gate(live)), rest)
+    (total.plus(term.weight.weigh(rest.clone(), 1.0)), rest)
 }
 
 /// Adds one octave of the ridged multifractal; it hands on the octave's signal.
 #[inline(always)]
-pub(crate) fn ridged<T: Number>(
+pub(crate) fn ridged<T: Number, W: Weight<T>>(
     offset: f64,
     gain: f64,
-    term: Term,
+    term: Term<W>,
     noise: T,
     (total, rest): Carried<T>,
 ) -> Carried<T> {
@@ -271,8 +282,8 @@ pub(crate) fn ridged<T: Number>(
     } else {
         rest.times(gain).clamp01().mul(ridge)
     };
-    let octave = signal.clone().times(term.weight * term.amplitude);
-    (total.plus(octave.gate(term.weight > 0.0)), signal)
+    let octave = term.weight.weigh(signal.clone(), term.amplitude);
+    (total.plus(octave), signal)
 }
 
 /// The weight of octave `i` where `depth` octaves count.

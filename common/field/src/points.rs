@@ -1,6 +1,6 @@
 //! Where a program is evaluated, and the memory it is evaluated in.
 
-use crate::program::{Machine, Slopes};
+use crate::program::{Ahead, Machine, Slopes};
 
 /// Points of one chunk of work: longer batches are cut into pieces of this length.
 pub const BATCH: usize = 128;
@@ -50,6 +50,7 @@ pub struct Scratch {
     pub(crate) machine: Machine,
     pub(crate) slopes: Slopes<3>,
     pub(crate) along: Slopes<1>,
+    pub(crate) stretches: Ahead,
 }
 
 impl Scratch {

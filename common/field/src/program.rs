@@ -1,5 +1,6 @@
 //! Compiled fields: a graph flattened for evaluation over batches of points.
 
+mod ahead;
 mod bends;
 mod bounds;
 mod code;
@@ -18,10 +19,12 @@ use fearless_simd::dispatch;
 use crate::interval::Interval;
 use crate::lanes::Lanes;
 use crate::modulus::Modulus;
-use crate::points::{Points, Scratch};
+use crate::points::{BATCH, Points, Scratch};
 use crate::simd::SimdLevel;
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
+pub(crate) use ahead::Ahead;
+pub use ahead::Errors;
 pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
@@ -178,6 +181,7 @@ impl Program {
             ..
         } = scratch;
         along.prepare(&self.code);
+        along.keep_noises(false);
         let mut start = 0;
         while start < n {
             along.aim(direction, start);
@@ -188,6 +192,59 @@ impl Program {
             numbers(&mut slope[start..end], &duals.gradient[0], 0.0);
             start = end;
         }
+    }
+
+    /// Whether [`Program::evaluate_ahead`] can bound the first root.
+    pub fn looks_ahead(&self) -> bool {
+        ahead::bounds(&self.code)
+    }
+
+    /// [`Program::evaluate_along`], and how far ahead of each place along its direction the first root is positive.
+    ///
+    /// `ahead` holds a first guess of that for each place, and then a distance that is proven, 0 if nothing is;
+    /// it may be a few times the guess. It is proven for values as they are computed.
+    ///
+    /// # Panics
+    /// If the slices differ in length or are longer than a batch, or if the program does not look ahead.
+    pub fn evaluate_ahead(
+        &self,
+        level: SimdLevel,
+        points: &Points<'_>,
+        direction: [&[f64]; 3],
+        errors: Errors<'_>,
+        scratch: &mut Scratch,
+        [value, slope, ahead]: [&mut [f64]; 3],
+    ) {
+        let n = points.len();
+        assert!(
+            n <= BATCH
+                && [&*value, &*slope, &*ahead, errors.offset, errors.slope]
+                    .iter()
+                    .chain(&direction)
+                    .all(|slice| slice.len() == n),
+            "the slices are as long as the batch, and that is one"
+        );
+        if n == 0 {
+            return;
+        }
+        let root = *self.code.roots.first().expect("there is a root");
+        let Scratch {
+            noise_evaluations,
+            along,
+            stretches,
+            ..
+        } = scratch;
+        along.prepare(&self.code);
+        along.keep_noises(true);
+        along.aim(direction, 0);
+        stretches.prepare(&self.code);
+        dispatch!(level.token(), simd => {
+            along.run(simd, &self.code, points, 0, noise_evaluations);
+            stretches.run(simd, &self.code, along, errors, root, ahead);
+        });
+        let duals = along.register(root);
+        numbers(value, &duals.value, f64::INFINITY);
+        numbers(slope, &duals.gradient[0], 0.0);
     }
 
     /// The values that each root can take, rounding included; may be infinite.

@@ -108,6 +108,11 @@ impl View {
             .fold(0.0, |most, way| if way > most { way } else { most })
     }
 
+    /// The image's sides, pixels.
+    pub(crate) fn size(&self) -> [f64; 2] {
+        self.middle.map(|half| 2.0 * half)
+    }
+
     /// Instants that occur, seconds from image 0.
     pub(crate) fn instants(&self) -> (f64, f64) {
         (self.start, self.start + self.shutter)

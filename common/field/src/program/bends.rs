@@ -63,8 +63,7 @@ pub(crate) fn taylor(plan: &Plan, around: &Surroundings) -> Option<Taylor> {
         slope: weights.slope + change.slope * SLOPE_ROUNDING,
         curvature: larger(-bend.low, 0.0) * ROOM,
     };
-    (taylor.offset.is_finite() && taylor.slope.is_finite() && taylor.curvature.is_finite())
-        .then_some(taylor)
+    (taylor.offset.is_finite() && taylor.slope.is_finite()).then_some(taylor)
 }
 
 /// The second derivatives of every step; of a vector, the norm's bound on either side.

@@ -3,11 +3,13 @@
 use crate::hash::{hash, unit};
 use crate::program::tests::{fig_5_6, noise_zoo, planet, scaled, values, zoo};
 use crate::{
-    Graph, Interval, NodeId, Op, Points, Program, Region, Scratch, SimdLevel, Surroundings,
+    BATCH, Errors, Graph, Interval, NodeId, Op, Points, Program, Region, Scratch, SimdLevel,
+    Surroundings,
 };
 
 /// Pairs of places in a region: near and far, with the footprints of a camera at `eye`.
 struct Pairs {
+    eye: [f64; 3],
     columns: [[Vec<f64>; 5]; 2],
     around: Surroundings,
 }
@@ -22,6 +24,12 @@ fn inside(region: Region, p: [f64; 3]) -> bool {
         Region::Slab { low, high } => (low..=high).contains(&p[2]),
         Region::Box { min, max } => (0..3).all(|i| (min[i]..=max[i]).contains(&p[i])),
     }
+}
+
+/// How wide a pixel is at a place.
+fn footprint(eye: [f64; 3], place: [f64; 3]) -> f64 {
+    let away = [0, 1, 2].map(|k| place[k] - eye[k]);
+    PIXEL_ANGLE * (away[0] * away[0] + away[1] * away[1] + away[2] * away[2]).sqrt()
 }
 
 impl Pairs {
@@ -48,9 +56,7 @@ impl Pairs {
             let t = number(10).abs();
             for (place, columns) in [p, q].into_iter().zip(&mut columns) {
                 assert!(inside(region, place), "{place:?}");
-                let away = [0, 1, 2].map(|k| place[k] - eye[k]);
-                let footprint = PIXEL_ANGLE
-                    * (away[0] * away[0] + away[1] * away[1] + away[2] * away[2]).sqrt();
+                let footprint = footprint(eye, place);
                 let row = [place[0], place[1], place[2], footprint, t];
                 for (column, value) in columns.iter_mut().zip(row) {
                     column.push(value);
@@ -68,7 +74,11 @@ impl Pairs {
             time: Interval::new(0.0, 1.0),
             footprint_slope: PIXEL_ANGLE,
         };
-        Self { columns, around }
+        Self {
+            eye,
+            columns,
+            around,
+        }
     }
 
     fn points(&self, end: usize) -> Points<'_> {
@@ -121,6 +131,7 @@ impl Pairs {
             );
         }
         self.check_taylor(name, program, &f, &g);
+        self.check_ahead(name, program, &f);
         steepest / modulus.lipschitz()
     }
 
@@ -168,13 +179,151 @@ impl Pairs {
                 - taylor.offset
                 - 0.5 * taylor.curvature * s * s;
             assert!(
-                !within || g[i] >= least,
+                !within || taylor.curvature.is_infinite() || g[i] >= least,
                 "{name}: {} after {s} is below {least}: {} {} {taylor:?}",
                 g[i],
                 value[i],
                 slope[i]
             );
         }
+    }
+}
+
+/// What is asked about stretches: from where, along which directions, how far, and above which values.
+struct Asked<'a> {
+    points: Points<'a>,
+    direction: [&'a [f64]; 3],
+    guess: &'a [f64],
+    offset: &'a [f64],
+    slope: &'a [f64],
+}
+
+/// How far ahead the program is above what is asked, batch by batch.
+fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
+    let mut ahead = asked.guess.to_vec();
+    let mut scratch = Scratch::new();
+    let Points {
+        x,
+        y,
+        z,
+        footprint,
+        time,
+    } = asked.points;
+    for start in (0..ahead.len()).step_by(BATCH) {
+        let batch = start..(start + BATCH).min(ahead.len());
+        let n = batch.len();
+        let part = |all: &'_ [f64]| all[batch.clone()].to_vec();
+        let [x, y, z, footprint, time] = [x, y, z, footprint, time].map(part);
+        let [dx, dy, dz] = asked.direction.map(part);
+        let (offset, slope) = (part(asked.offset), part(asked.slope));
+        let points = Points {
+            x: &x,
+            y: &y,
+            z: &z,
+            footprint: &footprint,
+            time: &time,
+        };
+        let errors = Errors {
+            offset: &offset,
+            slope: &slope,
+            footprint_slope: PIXEL_ANGLE,
+        };
+        let (mut value, mut along) = (vec![0.0; n], vec![0.0; n]);
+        let out = [&mut value[..], &mut along, &mut ahead[batch]];
+        program.evaluate_ahead(level, &points, [&dx, &dy, &dz], errors, &mut scratch, out);
+    }
+    ahead
+}
+
+impl Pairs {
+    /// Checks stretches ahead of the first place of every pair, towards the second: nowhere on them may the field
+    /// fall below the value that they are asked about.
+    fn check_ahead(&self, name: &str, program: &Program, f: &[f64]) {
+        let Some(taylor) = program.taylor(&self.around) else {
+            return;
+        };
+        if !program.looks_ahead() {
+            return;
+        }
+        let n = f.len().min(4_000);
+        let at = |i: usize, s: f64, direction: &[Vec<f64>; 3]| {
+            [0, 1, 2].map(|k| self.columns[0][k][i] + s * direction[k][i])
+        };
+        let way = |i: usize| [0, 1, 2].map(|k| self.columns[1][k][i] - self.columns[0][k][i]);
+        let distance = |i: usize| way(i).iter().map(|part| part * part).sum::<f64>().sqrt();
+        let direction = [0, 1, 2].map(|k| {
+            let part = |i: usize| way(i)[k] / distance(i).max(1e-300);
+            (0..n).map(part).collect::<Vec<_>>()
+        });
+        let number = |i: usize, k: u32| unit(hash(&[7, u32::try_from(i).unwrap(), k]));
+        let each = |of: &dyn Fn(usize) -> f64| (0..n).map(of).collect::<Vec<_>>();
+        let guess = each(&|i| distance(i) * libm::exp2(6.0 * number(i, 0) - 3.0));
+        let floor = each(&|i| f[i] - libm::exp2(20.0 * number(i, 1) - 16.0));
+        let offset = each(&|i| taylor.offset + floor[i]);
+        let [dx, dy, dz] = &direction;
+        let [x, y, z, footprints, time] = &self.columns[0];
+        let asked = Asked {
+            points: Points {
+                x: &x[..n],
+                y: &y[..n],
+                z: &z[..n],
+                footprint: &footprints[..n],
+                time: &time[..n],
+            },
+            direction: [dx, dy, dz],
+            guess: &guess,
+            offset: &offset,
+            slope: &vec![taylor.slope; n],
+        };
+        let ahead = clear(program, SimdLevel::best(), &asked);
+        for level in SimdLevel::all_available() {
+            let bits = |all: &[f64]| all.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
+            let same = bits(&clear(program, level, &asked)) == bits(&ahead);
+            assert!(same, "{name} at {level}");
+        }
+        let mut outside = vec![false; n];
+        for step in 1..=8 {
+            let mut columns: [Vec<f64>; 5] = Default::default();
+            for i in 0..n {
+                let place = at(i, ahead[i] * f64::from(step) / 8.0, &direction);
+                outside[i] |= !inside(self.around.region, place);
+                let row = [
+                    place[0],
+                    place[1],
+                    place[2],
+                    footprint(self.eye, place),
+                    time[i],
+                ];
+                for (column, value) in columns.iter_mut().zip(row) {
+                    column.push(value);
+                }
+            }
+            let [x, y, z, footprint, time] = &columns;
+            let points = Points {
+                x,
+                y,
+                z,
+                footprint,
+                time,
+            };
+            let there = values(program, SimdLevel::best(), &points);
+            for i in 0..n {
+                assert!(
+                    outside[i] || ahead[i] == 0.0 || there[i] > floor[i],
+                    "{name}: {} is below {} after {} of {}",
+                    there[i],
+                    floor[i],
+                    f64::from(step) / 8.0,
+                    ahead[i]
+                );
+            }
+        }
+        // Values that are finite and asked about something below them see some way.
+        let seen = ahead.iter().filter(|a| **a > 0.0).count();
+        assert!(
+            2 * seen > n || taylor.offset > 1e-4,
+            "{name}: {seen} of {n}"
+        );
     }
 }
 

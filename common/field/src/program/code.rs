@@ -19,7 +19,7 @@ pub(crate) const REGISTERS_MAX: usize = 4096;
 /// The registers of a batch's x, y, z, footprint and time; those of constants follow.
 pub(crate) const INPUTS: usize = 5;
 pub(crate) const FOOTPRINT: usize = 3;
-const TIME: usize = 4;
+pub(crate) const TIME: usize = 4;
 
 /// What an instruction computes from its arguments.
 #[derive(Clone, PartialEq, Debug)]

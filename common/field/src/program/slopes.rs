@@ -72,6 +72,64 @@ pub(crate) struct Slopes<const N: usize> {
     constants: Vec<f64>,
     result: Box<Duals<N>>,
     octaves: Box<Octaves<N>>,
+    pub(crate) tape: Tape<N>,
+}
+
+/// What noises gave, in the order in which the code asks for them.
+#[derive(Debug, Default)]
+pub(crate) struct Tape<const N: usize> {
+    /// Whether every noise is kept; else each takes the place of the last.
+    keeps: bool,
+    samples: Vec<Box<Sample<N>>>,
+    /// The next sample's place.
+    next: usize,
+    /// Of every cascade, how many octaves it has evaluated and its depths.
+    cascades: Vec<(usize, Box<Lanes>)>,
+    next_cascade: usize,
+}
+
+impl<const N: usize> Tape<N> {
+    fn rewind(&mut self) {
+        (self.next, self.next_cascade) = (0, 0);
+    }
+
+    /// Where the next noise goes.
+    #[inline(always)]
+    fn sample(&mut self) -> &mut Sample<N> {
+        let place = if self.keeps { self.next } else { 0 };
+        self.next += 1;
+        if place == self.samples.len() {
+            self.samples.push(Box::new(Sample {
+                noise: [0.0; BATCH],
+                gradient: [[0.0; BATCH]; N],
+            }));
+        }
+        &mut self.samples[place]
+    }
+
+    fn keep_cascade(&mut self, n: usize, octaves: usize, depth: &Lanes) {
+        if !self.keeps {
+            return;
+        }
+        if self.next_cascade == self.cascades.len() {
+            self.cascades.push((0, Box::new([0.0; BATCH])));
+        }
+        let (count, kept) = &mut self.cascades[self.next_cascade];
+        *count = octaves;
+        kept[..n].copy_from_slice(&depth[..n]);
+        self.next_cascade += 1;
+    }
+
+    /// The noise that was asked for as number `i`.
+    pub(crate) fn sample_at(&self, i: usize) -> &Sample<N> {
+        &self.samples[i]
+    }
+
+    /// The cascade that was asked for as number `i`: how many octaves it evaluated, and its depths.
+    pub(crate) fn cascade_at(&self, i: usize) -> (usize, &Lanes) {
+        let (octaves, depth) = &self.cascades[i];
+        (*octaves, depth)
+    }
 }
 
 /// Room for the octaves of one cascade.
@@ -82,17 +140,16 @@ struct Octaves<const N: usize> {
     along: [[f32; BATCH]; 3],
     /// All three derivatives of a noise that is not asked along a direction itself.
     full: [[f32; BATCH]; 3],
-    sample: Sample<N>,
+    depth: Lanes,
     total: Box<Duals<N>>,
     rest: Box<Duals<N>>,
 }
 
 /// One octave's noise over the lanes.
 #[derive(Debug)]
-struct Sample<const N: usize> {
-    noise: [f32; BATCH],
-    gradient: [[f32; BATCH]; N],
-    depth: Lanes,
+pub(crate) struct Sample<const N: usize> {
+    pub(crate) noise: [f32; BATCH],
+    pub(crate) gradient: [[f32; BATCH]; N],
 }
 
 /// Which octave.
@@ -101,6 +158,7 @@ struct Place<'a> {
     n: usize,
     i: f64,
     octave: &'a Octave,
+    depth: &'a Lanes,
 }
 
 impl<const N: usize> Default for Slopes<N> {
@@ -109,15 +167,12 @@ impl<const N: usize> Default for Slopes<N> {
             registers: Vec::new(),
             constants: Vec::new(),
             result: Duals::new(),
+            tape: Tape::default(),
             octaves: Box::new(Octaves {
                 cells: Cells::new(),
                 along: [[0.0; BATCH]; 3],
                 full: [[0.0; BATCH]; 3],
-                sample: Sample {
-                    noise: [0.0; BATCH],
-                    gradient: [[0.0; BATCH]; N],
-                    depth: [0.0; BATCH],
-                },
+                depth: [0.0; BATCH],
                 total: Duals::new(),
                 rest: Duals::new(),
             }),
@@ -164,6 +219,11 @@ impl<const N: usize> Slopes<N> {
         }
     }
 
+    /// Whether the noises of the runs to come are kept on the tape, each run's in place of the last one's.
+    pub(crate) fn keep_noises(&mut self, keeps: bool) {
+        self.tape.keeps = keeps;
+    }
+
     /// Evaluates the points from `start` on, as many as a batch holds.
     #[inline(always)]
     pub(crate) fn run<S: Simd>(
@@ -174,6 +234,7 @@ impl<const N: usize> Slopes<N> {
         start: usize,
         noises: &mut u64,
     ) -> Count {
+        self.tape.rewind();
         let mut inputs = self.registers.iter_mut();
         let count = machine::load(points, start, |_| {
             &mut inputs
@@ -271,12 +332,8 @@ impl<const N: usize> Slopes<N> {
                 },
             ),
             Operation::Noise(lattice) => {
-                let Octaves {
-                    cells,
-                    along,
-                    sample,
-                    ..
-                } = &mut *self.octaves;
+                let Octaves { cells, along, .. } = &mut *self.octaves;
+                let sample = self.tape.sample();
                 lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
                 if N == 1 {
                     directions(n, &IDENTITY, [a, b, c], along);
@@ -292,9 +349,9 @@ impl<const N: usize> Slopes<N> {
                 let Octaves {
                     cells,
                     full: gradient,
-                    sample: Sample { noise, .. },
                     ..
                 } = &mut *self.octaves;
+                let Sample { noise, .. } = self.tape.sample();
                 lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
                 match &instruction.act {
                     Operation::Slope(any, axis) => {
@@ -315,7 +372,10 @@ impl<const N: usize> Slopes<N> {
             }
             Operation::Cascade(cascade) => {
                 let footprint = &self.registers[FOOTPRINT].value;
-                let noises = self.octaves.run(simd, cascade, count, [a, b, c], footprint);
+                let tape = &mut self.tape;
+                let noises = self
+                    .octaves
+                    .run(simd, cascade, count, [a, b, c], footprint, tape);
                 let total = &self.octaves.total;
                 for i in 0..n {
                     let total = total.at(i);
@@ -461,6 +521,7 @@ impl<const N: usize> Octaves<N> {
         count: Count,
         at: [&Duals<N>; 3],
         footprint: &Lanes,
+        tape: &mut Tape<N>,
     ) -> u64 {
         let n = count.lanes;
         let mut noises = 0;
@@ -469,20 +530,23 @@ impl<const N: usize> Octaves<N> {
             cells,
             along,
             full,
-            sample,
+            depth,
             total,
             rest,
         } = self;
-        machine::depths(cascade, n, footprint, &mut sample.depth);
+        machine::depths(cascade, n, footprint, depth);
+        let mut octaves = 0;
         total.clear(n);
         rest.clear(n);
         for (i, octave) in cascade.octaves.iter().enumerate() {
             let i = cascade::index(i);
-            let live = machine::live(&sample.depth, count.points, i);
+            let live = machine::live(depth, count.points, i);
             if live == 0 {
                 break;
             }
             noises += live;
+            octaves += 1;
+            let sample = tape.sample();
             lanes::place(simd, n, octave, place, cells);
             if N == 1 {
                 directions(n, &octave.matrix, at, along);
@@ -494,8 +558,15 @@ impl<const N: usize> Octaves<N> {
                     sample.take(n, full, along);
                 }
             }
-            add(cascade.model, Place { n, i, octave }, sample, total, rest);
+            let place = Place {
+                n,
+                i,
+                octave,
+                depth,
+            };
+            add(cascade.model, place, sample, total, rest);
         }
+        tape.keep_cascade(n, octaves, depth);
         noises
     }
 }
@@ -568,19 +639,23 @@ fn add<const N: usize>(
 
 #[inline(always)]
 fn add_each<const N: usize>(
-    Place { n, i, octave }: Place<'_>,
+    Place {
+        n,
+        i,
+        octave,
+        depth,
+    }: Place<'_>,
     sample: &Sample<N>,
     total: &mut Duals<N>,
     rest: &mut Duals<N>,
     add: impl Fn(Term, Dual<N>, Carried<Dual<N>>) -> Carried<Dual<N>>,
 ) {
     let (matrix, amplitude) = (octave.matrix, octave.amplitude);
-    assert!(n <= BATCH);
-    for lane in 0..n {
+    for (lane, depth) in depth[..n].iter().copied().enumerate() {
         let term = Term {
             first: i == 0.0,
             amplitude,
-            weight: cascade::weight(sample.depth[lane], i),
+            weight: cascade::weight(depth, i),
         };
         let mut gradient = sample.slopes(lane);
         if N == 3 {

@@ -1,6 +1,6 @@
 //! Places along many rays, and the field's values there: structure of arrays.
 
-use field::{BATCH, Points, Scratch};
+use field::{BATCH, Errors, Points, Scratch};
 use glam::DVec3;
 
 use super::surface::Surface;
@@ -161,5 +161,35 @@ impl Batch {
         );
         self.value[..n].copy_from_slice(&value[..n]);
         self.slope[..n].copy_from_slice(&slope[..n]);
+    }
+
+    /// Evaluates the field at the places, its derivative along the paths, and how far ahead it is positive,
+    /// from a first guess in `ahead`.
+    pub(crate) fn evaluate_ahead(
+        &mut self,
+        surface: &Surface,
+        n: usize,
+        paths: &Paths,
+        [offset, slope]: [&Lanes; 2],
+        ahead: &mut Lanes,
+        scratch: &mut Scratch,
+    ) {
+        let (mut value, mut derivative) = ([0.0; BATCH], [0.0; BATCH]);
+        let [x, y, z] = &paths.direction;
+        let errors = Errors {
+            offset: &offset[..n],
+            slope: &slope[..n],
+            footprint_slope: surface.footprint.angle,
+        };
+        surface.program.evaluate_ahead(
+            surface.level,
+            &self.points(n, paths),
+            [&x[..n], &y[..n], &z[..n]],
+            errors,
+            scratch,
+            [&mut value[..n], &mut derivative[..n], &mut ahead[..n]],
+        );
+        self.value[..n].copy_from_slice(&value[..n]);
+        self.slope[..n].copy_from_slice(&derivative[..n]);
     }
 }

@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::batch::{Batch, Lanes, Paths};
 use super::bound;
 use super::clearance::{CAUTION, FLAT, Known, widened};
+use super::means::Means;
 use super::surface::Surface;
 use super::tracer::Ray;
 use crate::counts::Counts;
@@ -18,8 +19,13 @@ use crate::counts::Counts;
 /// Rays of the bundles, largest first; each size is that of the next four times over.
 const SIZES: [usize; 3] = [64, 16, 4];
 
-/// A bundle splits where it may step no farther than this share of its radius.
-const SPLIT: f64 = 0.25;
+/// A bundle splits where it may step no farther than this share of its radius: sooner where single rays see more.
+fn split(means: Means) -> f64 {
+    match means {
+        Means::Stretches => 1.0,
+        Means::Tangents | Means::Values => 0.25,
+    }
+}
 
 /// Most steps of one bundle.
 const STEPS_MAX: u32 = 256;
@@ -170,13 +176,14 @@ impl Bundles {
             #[inline(always)]
             || at.advance(n, known, paths, batch),
         );
+        let split = split(surface.means);
         for i in (0..n).rev() {
             let lane = &mut lanes[i];
             let radius = at.radius[i] + at.spread[i] * at.t[i];
             let ahead = at.ahead[i];
             lane.steps += 1;
             at.t[i] += ahead;
-            if ahead > SPLIT * radius && at.t[i] <= lane.end && lane.steps < STEPS_MAX {
+            if ahead > split * radius && at.t[i] <= lane.end && lane.steps < STEPS_MAX {
                 continue;
             }
             for span in &mut spans[lane.first..lane.first + lane.count] {

@@ -99,6 +99,8 @@ pub(crate) struct Clearance {
     picks: Vec<Pick>,
     /// How far the field may fall below its tangent.
     pub(crate) tangent: Taylor,
+    /// The errors of values and of derivatives along rays.
+    pub(crate) errors: (f64, f64),
     /// The bounds hold no farther than this from the place, metres.
     pub(crate) reach: f64,
 }
@@ -141,9 +143,15 @@ impl Clearance {
                     .unwrap_or(nothing)
             })
             .collect();
+        let errors = tangent.map_or((f64::INFINITY, 0.0), |tangent| {
+            (tangent.offset, tangent.slope)
+        });
         Self {
             picks,
-            tangent: tangent.unwrap_or(NO_TANGENT),
+            tangent: tangent
+                .filter(|tangent| tangent.curvature.is_finite())
+                .unwrap_or(NO_TANGENT),
+            errors,
             reach,
         }
     }
@@ -294,50 +302,18 @@ pub(crate) fn widened(bound: &Bound) -> Bound {
     }
 }
 
-/// How many times as long steps have to be for a derivative to be worth its cost.
-const WORTH: f64 = 1.6;
-
 impl Clearances {
-    /// Whether tangents make steps so much longer that derivatives are worth their cost.
-    ///
-    /// Judged at every distance for values of one to sixteen footprints on a ray that loses a quarter of a
-    /// metre of height to the metre. It decides how fast rays are traced and nothing else.
-    pub(crate) fn gain_by_tangents(&self, footprint: Footprint) -> bool {
-        const FALL: f64 = 0.25;
-        let (mut gain, mut count) = (0.0, 0.0);
-        for (table, place) in self.tables.iter().zip(self.first - 1..) {
-            let is_only = self.tables.len() == 1;
-            if table.picks[0].offset.is_infinite() || (place < self.first && !is_only) {
-                continue;
-            }
-            let distance = if is_only { 0.0 } else { power(place) };
-            if distance > 1e5 {
-                break;
-            }
-            for pixels in [1.0, 2.0, 4.0, 8.0, 16.0] {
-                let value = pixels * footprint.at(distance);
-                let pick = table.pick(value);
-                let plain = (value - pick.offset) / larger(pick.slope, FLAT);
-                let Taylor {
-                    offset,
-                    slope,
-                    curvature,
-                } = table.tangent;
-                let (rest, fall) = (value - offset, FALL + slope);
-                let size = (fall * fall + 2.0 * curvature * larger(rest, 0.0)).sqrt();
-                let tangent = 2.0 * rest / (size + fall);
-                if plain > 0.0 || tangent > 0.0 {
-                    gain += larger(tangent, 0.0) / larger(plain, tangent / 16.0);
-                    count += 1.0;
-                }
-            }
-        }
-        gain > WORTH * count
+    /// Whether a tangent bounds the field anywhere.
+    pub(crate) fn have_tangents(&self) -> bool {
+        self.tables
+            .iter()
+            .any(|table| table.tangent.offset.is_finite())
     }
-}
 
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
+    /// Whether the errors of values and derivatives are known anywhere.
+    pub(crate) fn have_errors(&self) -> bool {
+        self.tables.iter().any(|table| table.errors.0.is_finite())
+    }
 }
 
 /// The exponent e of 2ᵉ ≤ `value` < 2ᵉ⁺¹, for positive, normal values.

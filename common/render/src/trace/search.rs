@@ -19,6 +19,7 @@ use super::bound;
 use super::bracket::End;
 use super::bundle::Span;
 use super::grid::Steps;
+use super::means::Means;
 use super::polish::Found;
 use super::surface::Surface;
 use super::tracer::{Goal, Hit, Ray, Results, Wanted};
@@ -141,6 +142,7 @@ impl Search {
         rows.outside[lane] = f64::NEG_INFINITY;
         rows.outside_value[lane] = 0.0;
         rows.count[lane] = 0.0;
+        rows.seen[lane] = 0.0;
         rows.steps.set(lane, steps);
         self.rays.push(Lane {
             ray: span.ray,
@@ -165,6 +167,7 @@ impl Search {
             &mut rows.outside,
             &mut rows.outside_value,
             &mut rows.count,
+            &mut rows.seen,
         ] {
             row[i] = row[last];
         }
@@ -180,7 +183,16 @@ impl Search {
             #[inline(always)]
             || batch.go(surface, n, paths, &rows.at),
         );
-        if surface.tangents {
+        for i in 0..n {
+            let clearance = surface.clearances.at(batch.distance[i]);
+            (rows.error[i], rows.slope_error[i]) = clearance.errors;
+            rows.reach[i] = clearance.reach;
+        }
+        if surface.means == Means::Stretches {
+            rows.guess(n);
+            let errors = [&rows.error, &rows.slope_error];
+            batch.evaluate_ahead(surface, n, paths, errors, &mut rows.seen, scratch);
+        } else if surface.means == Means::Tangents {
             batch.evaluate_along(surface, n, paths, scratch);
         } else {
             batch.evaluate(surface, n, paths, scratch);
@@ -191,14 +203,13 @@ impl Search {
             let pick = clearance.pick(batch.value[i]);
             (rows.offset[i], rows.slope[i]) = (pick.offset, pick.slope);
             let tangent = &clearance.tangent;
-            rows.tangent_offset[i] = if surface.tangents {
+            rows.tangent_offset[i] = if surface.means != Means::Values {
                 tangent.offset
             } else {
                 f64::INFINITY
             };
             rows.tangent_slope[i] = tangent.slope;
             rows.curvature[i] = tangent.curvature;
-            rows.reach[i] = clearance.reach;
         }
         if bound::cuts(&surface.bound) {
             for i in 0..n {

@@ -7,6 +7,7 @@ use scene::description::{Bound, Seed};
 
 use super::clearance::{Around, Clearances};
 use super::grid::Grid;
+use super::means::{self, Means};
 use super::split::split;
 use crate::error::RenderError;
 use crate::view::{Footprint, View};
@@ -39,8 +40,8 @@ pub(crate) struct Surface {
     pub(crate) sight: Grid,
     /// Whether the field changes while the shutter is open.
     pub(crate) moves: bool,
-    /// Whether derivatives along rays are worth what they cost.
-    pub(crate) tangents: bool,
+    /// How single rays find how far they may step.
+    pub(crate) means: Means,
 }
 
 impl Surface {
@@ -82,9 +83,9 @@ impl Surface {
             let spacing = footprint.base * SHARE;
             Grid::even(spacing, spacing * EVEN_POINTS)
         };
-        Ok(Self {
+        let mut surface = Self {
             moves: program.moves(),
-            tangents: clearances.gain_by_tangents(footprint),
+            means: Means::Values,
             program,
             level,
             clearances,
@@ -92,7 +93,18 @@ impl Surface {
             seed: surface.seed,
             footprint,
             sight,
-        })
+        };
+        let mut allowed = vec![Means::Values];
+        if surface.clearances.have_tangents() {
+            allowed.push(Means::Tangents);
+        }
+        if surface.clearances.have_errors() && surface.program.looks_ahead() {
+            allowed.push(Means::Stretches);
+        }
+        if allowed.len() > 1 {
+            surface.means = means::cheapest(&surface, view, &allowed);
+        }
+        Ok(surface)
     }
 
     /// The grid of a ray that starts at the surface, at a distance from the eye.

@@ -16,6 +16,12 @@ const FORESIGHT: f64 = 0.9;
 /// From where on the way to the tangent's root counts as nearly proven: steps then go to the root itself.
 const NEARLY: f64 = 0.6;
 
+/// How many points of its grid a ray looks ahead at first.
+const FIRST: f64 = 64.0;
+
+/// By how much a ray looks farther ahead than it could the last time.
+const FARTHER: f64 = 1.3;
+
 /// Lanes are computed in multiples of this, so that vector loops have no scalar rest.
 const STEP: usize = 8;
 
@@ -52,6 +58,11 @@ pub(super) struct Rows {
     derivative: Lanes,
     /// How fast the known part of the field grows there.
     growth: Lanes,
+    /// What values and derivatives may be wrong by.
+    pub(super) error: Lanes,
+    pub(super) slope_error: Lanes,
+    /// How far ahead the field is proven to be positive by its own ranges, and the guess before that.
+    pub(super) seen: Lanes,
     /// How far ahead and back of the point no root can be.
     ahead: Lanes,
     behind: Lanes,
@@ -80,6 +91,9 @@ impl Default for Rows {
             value: [0.0; BATCH],
             derivative: [0.0; BATCH],
             growth: [0.0; BATCH],
+            error: [0.0; BATCH],
+            slope_error: [0.0; BATCH],
+            seen: [0.0; BATCH],
             ahead: [0.0; BATCH],
             behind: [0.0; BATCH],
         }
@@ -93,6 +107,26 @@ impl Rows {
             let way = self.at[i] - self.outside[i];
             let slope = (batch.value[i] - self.outside_value[i]) / way;
             batch.slope[i] = if slope.is_finite() { slope } else { 0.0 };
+        }
+    }
+
+    /// How far ahead to look: a little farther than the last time, but no nearer than the next points.
+    pub(super) fn guess(&mut self, n: usize) {
+        for i in 0..n {
+            let at = self.at[i];
+            let gap = self.steps.at(i).after(at) - at;
+            let least = if self.count[i] > 0.0 {
+                2.0 * gap
+            } else {
+                FIRST * gap
+            };
+            let guess = FARTHER * self.seen[i];
+            let guess = if guess > least { guess } else { least };
+            self.seen[i] = if guess < self.reach[i] {
+                guess
+            } else {
+                self.reach[i]
+            };
         }
     }
 
@@ -205,6 +239,7 @@ impl Rows {
                 self.reach[i]
             }
         };
+        let ahead = most(ahead, self.seen[i]);
         (cut(ahead, tangent_ahead), cut(behind, tangent_behind))
     }
 }

@@ -1,0 +1,288 @@
+//! How far ahead of a place a field has no root: its derivative bounded on the stretch of the ray before it.
+//!
+//! One evaluation with its derivative gives every noise n and its derivative n′ at the place. On the stretch of
+//! length s before it no derivative of the noise leaves n′ ± (B s + …), for the second derivatives of a noise
+//! have a bound B, and so no value leaves n + [0, s]·n′. These ranges go through the code as
+//! [`stretch::Stretch`]es, without another noise, and give the field's least derivative m on the stretch: by the
+//! mean value theorem f(x) + m s bounds the field from below. What an octave weighs, and so how steep it can
+//! be, is known at the place: far less than anywhere. Segment tracing (Galin et al. 2020) does this with
+//! Lipschitz bounds; with second derivatives rays close in on roots like Newton's method.
+//!
+//! Where the guess of a stretch was too long, as much of it is clear as its slope allows.
+
+mod lanes;
+mod octaves;
+mod stretch;
+
+use fearless_simd::Simd;
+
+use crate::arithmetic::{Binary, Unary};
+use crate::number::Number;
+use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation, TIME};
+use crate::program::slopes::Slopes;
+use lanes::{Stretches, WIDTH, row};
+use octaves::{Growth, Octaves};
+use stretch::{Stretch, least, most};
+
+/// What the field's values and derivatives may be wrong by, lane by lane; of [`crate::Taylor`].
+#[derive(Clone, Copy, Debug)]
+pub struct Errors<'a> {
+    /// In the field's unit: rounding of its values.
+    pub offset: &'a [f64],
+    /// In the field's unit per metre: rounding of the derivative, and what levels of detail change.
+    pub slope: &'a [f64],
+    /// How fast footprints grow along a ray at most.
+    pub footprint_slope: f64,
+}
+
+/// The registers of stretches.
+#[derive(Debug)]
+#[expect(clippy::vec_box, reason = "results take their places by pointer")]
+pub(crate) struct Ahead {
+    registers: Vec<Box<Stretches>>,
+    constants: Vec<f64>,
+    result: Box<Stretches>,
+    octaves: Box<Octaves>,
+}
+
+impl Default for Ahead {
+    fn default() -> Self {
+        Self {
+            registers: Vec::new(),
+            constants: Vec::new(),
+            result: Stretches::new(),
+            octaves: Box::new(Octaves::new()),
+        }
+    }
+}
+
+/// Whether stretches of these operations are bounded.
+pub(crate) fn bounds(code: &Code) -> bool {
+    code.instructions
+        .iter()
+        .all(|instruction| match &instruction.act {
+            Operation::AnyNoise(_)
+            | Operation::Slope(..)
+            | Operation::Shape(_)
+            | Operation::Grid(_) => false,
+            Operation::Cascade(cascade) => cascade.octaves.iter().all(|o| o.noise.is_none()),
+            _ => true,
+        })
+}
+
+impl Ahead {
+    /// Makes room for the code and sets its constants.
+    pub(crate) fn prepare(&mut self, code: &Code) {
+        let grown = self.registers.len() < code.registers;
+        if grown {
+            self.registers.resize_with(code.registers, Stretches::new);
+        }
+        let same = self.constants.len() == code.constants.len()
+            && self
+                .constants
+                .iter()
+                .zip(&code.constants)
+                .all(|(a, b)| a.to_bits() == b.to_bits());
+        if grown || !same {
+            for (register, constant) in self.registers[INPUTS..].iter_mut().zip(&code.constants) {
+                register.fill(Stretch::constant(*constant));
+            }
+            self.constants.clone_from(&code.constants);
+        }
+    }
+
+    /// How far ahead of some places no root can be, from `length` as a first guess, which it replaces. What the
+    /// code gave at the places is in `along`.
+    #[inline(always)]
+    pub(crate) fn run<S: Simd>(
+        &mut self,
+        simd: S,
+        code: &Code,
+        along: &Slopes<1>,
+        errors: Errors<'_>,
+        root: usize,
+        length: &mut [f64],
+    ) {
+        let value = &along.register(root).value;
+        for (chunk, length) in length.chunks_mut(WIDTH).enumerate() {
+            let start = chunk * WIDTH;
+            let points = length.len();
+            let row = &mut self.octaves.length;
+            row[..points].copy_from_slice(length);
+            row[points..].fill(length[points - 1]);
+            self.inputs(start, along);
+            let mut place = Place {
+                start,
+                sample: 0,
+                cascade: 0,
+            };
+            for instruction in &code.instructions {
+                self.step(simd, instruction, along, errors.footprint_slope, &mut place);
+                std::mem::swap(&mut self.registers[instruction.result], &mut self.result);
+            }
+            let end = start + points;
+            let errors = [&errors.offset[start..end], &errors.slope[start..end]];
+            self.registers[root].clear(&value[start..end], errors, length);
+        }
+    }
+
+    /// The places' own stretches.
+    #[inline(always)]
+    fn inputs(&mut self, start: usize, along: &Slopes<1>) {
+        let length = &self.octaves.length;
+        for (i, register) in self.registers[..3].iter_mut().enumerate() {
+            let from = along.register(i);
+            let (at, slope) = (row(&from.value, start), row(&from.gradient[0], start));
+            for lane in 0..WIDTH {
+                let end = at[lane] + slope[lane] * length[lane];
+                let ends = (least(at[lane], end), most(at[lane], end));
+                register.set(lane, Stretch::new(ends, (slope[lane], slope[lane])));
+            }
+        }
+        // The footprint is no argument of anything but cascades, and time stands still.
+        let time = row(&along.register(TIME).value, start);
+        let register = &mut self.registers[TIME];
+        for (lane, time) in time.iter().enumerate() {
+            register.set(lane, Stretch::constant(*time));
+        }
+    }
+
+    #[inline(always)]
+    fn step<S: Simd>(
+        &mut self,
+        simd: S,
+        instruction: &Instruction,
+        along: &Slopes<1>,
+        footprint_slope: f64,
+        place: &mut Place,
+    ) {
+        let [a, b, c] = instruction.args.map(|arg| &*self.registers[arg]);
+        let out = &mut *self.result;
+        match &instruction.act {
+            Operation::Unary(unary) => unary_lanes(*unary, a, out),
+            Operation::Binary(binary) => binary_lanes(*binary, [a, b], out),
+            Operation::Select => each3([a, b, c], out, Stretch::select),
+            Operation::Length => each3(
+                [a, b, c],
+                out,
+                #[inline(always)]
+                |a, b, c| Stretch::length([a, b, c]),
+            ),
+            Operation::OntoSphere(radius) => each(
+                a,
+                out,
+                #[inline(always)]
+                |a| a.inverse(*radius),
+            ),
+            Operation::Power(exponent) => each(a, out, |a| a.power(*exponent)),
+            Operation::SmoothStep(low, high) => each(
+                a,
+                out,
+                #[inline(always)]
+                |a| a.smoothstep(*low, *high),
+            ),
+            Operation::Curve(curve) => each(a, out, |a| {
+                let over = crate::interval::Interval::new(a.low, a.high);
+                let (range, slope) = (curve.range(over), curve.slope_max(over));
+                let size = slope * a.steepness();
+                Stretch::new((range.low, range.high), (-size, size))
+            }),
+            Operation::Noise(_) => {
+                let octaves = &mut *self.octaves;
+                let from = along.tape.sample_at(place.sample);
+                place.sample += 1;
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        octaves.argument([a, b, c]);
+                        octaves.noise(from, place.start, 1.0);
+                    },
+                );
+                out.copy(&octaves.noise);
+            }
+            Operation::Cascade(cascade) => {
+                let octaves = &mut *self.octaves;
+                let growth = Growth {
+                    footprint: row(&along.register(FOOTPRINT).value, place.start),
+                    rate: footprint_slope,
+                };
+                octaves.run(simd, cascade, [a, b, c], growth, &along.tape, place);
+                out.copy(&octaves.total);
+            }
+            Operation::AnyNoise(_)
+            | Operation::Slope(..)
+            | Operation::Shape(_)
+            | Operation::Grid(_) => unreachable!("their stretches are not bounded"),
+        }
+    }
+}
+
+/// How far the code has been followed for which lanes.
+#[derive(Clone, Copy)]
+struct Place {
+    /// The first lane of the batch.
+    start: usize,
+    /// The next of the tape's samples and cascades.
+    sample: usize,
+    cascade: usize,
+}
+
+#[inline(always)]
+fn each(a: &Stretches, out: &mut Stretches, f: impl Fn(Stretch) -> Stretch) {
+    for i in 0..WIDTH {
+        out.set(i, f(a.at(i)));
+    }
+}
+
+#[inline(always)]
+fn each2([a, b]: [&Stretches; 2], out: &mut Stretches, f: impl Fn(Stretch, Stretch) -> Stretch) {
+    for i in 0..WIDTH {
+        out.set(i, f(a.at(i), b.at(i)));
+    }
+}
+
+#[inline(always)]
+fn each3(
+    [a, b, c]: [&Stretches; 3],
+    out: &mut Stretches,
+    f: impl Fn(Stretch, Stretch, Stretch) -> Stretch,
+) {
+    for i in 0..WIDTH {
+        out.set(i, f(a.at(i), b.at(i), c.at(i)));
+    }
+}
+
+/// One loop per function, so that none of them decides anything.
+#[inline(always)]
+fn unary_lanes(unary: Unary, a: &Stretches, out: &mut Stretches) {
+    macro_rules! lanes {
+        ($($unary:ident)+) => {
+            match unary {
+                $(Unary::$unary => each(
+                    a,
+                    out,
+                    #[inline(always)]
+                    |a| a.unary(Unary::$unary),
+                ),)+
+            }
+        };
+    }
+    lanes!(Neg Abs Sqrt Sin Cos Exp);
+}
+
+#[inline(always)]
+fn binary_lanes(binary: Binary, args: [&Stretches; 2], out: &mut Stretches) {
+    macro_rules! lanes {
+        ($($binary:ident)+) => {
+            match binary {
+                $(Binary::$binary => each2(
+                    args,
+                    out,
+                    #[inline(always)]
+                    |a, b| Binary::$binary.of_numbers(a, b),
+                ),)+
+            }
+        };
+    }
+    lanes!(Add Sub Mul Div Min Max);
+}
