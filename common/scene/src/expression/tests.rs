@@ -690,7 +690,7 @@ fn hostile_scripts_are_told_where_they_go_wrong() {
         (
             "let i = 0;\nwhile true { i += 1 }",
             "the expression takes too many steps",
-            Some((2, 16)),
+            Some((2, 19)),
         ),
         (
             "let a = [1];\nfor i in 0..64 { a += a; } 1",
