@@ -121,6 +121,12 @@ impl Error {
         }
     }
 
+    /// The same failure, with what it is part of said first.
+    pub(crate) fn within(mut self, whole: impl fmt::Display) -> Self {
+        self.attempt = format!("{whole}: {}", self.attempt);
+        self
+    }
+
     /// Why; where the cause is known well enough, what to do about it too.
     pub(crate) fn because(mut self, cause: impl Into<Cause>) -> Self {
         let cause = cause.into();

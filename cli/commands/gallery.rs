@@ -2,7 +2,7 @@
 
 use std::fs;
 use std::io::{self, Write};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
@@ -19,10 +19,12 @@ use crate::existing::stem;
 use crate::gallery::index::{Figure, Index};
 use crate::gallery::page;
 use crate::gallery::record::{Record, Records};
-use crate::load::Scene;
+use crate::gallery::size;
+use crate::gallery::telling::{Picture, Telling};
+use crate::load::{Scene, mistakes, readable};
 use crate::options::{Context, SceneOptions};
 use crate::output::{self, Report};
-use crate::progress::{Progress, duration};
+use crate::progress::duration;
 use crate::render::{News, Plan};
 use crate::stop::Stop;
 use crate::values;
@@ -47,6 +49,11 @@ pub(crate) struct Gallery {
     /// shows the others too if they are there.
     #[arg(long, value_name = "NAME", help_heading = "What to render")]
     only: Vec<String>,
+
+    /// Render every picture in its scene's own size, with all its rays; without it pictures are at
+    /// most 360 pixels wide and high, with four rays a pixel.
+    #[arg(long, help_heading = "What to render")]
+    full: bool,
 
     /// Render threads [default: one for each processor].
     #[arg(long, value_name = "N", value_parser = values::at_least_one, help_heading = "How to compute it")]
@@ -81,7 +88,7 @@ pub(crate) fn run(context: &Context, options: &Gallery) -> Result<Ending, Error>
     let scenes: Vec<Scene> = index
         .figures
         .iter()
-        .map(|figure| scene_of(&options.scenes, figure).load())
+        .map(|figure| scene_of(options, figure))
         .collect::<Result<_, _>>()?;
     let stop = Stop::on_signals()?;
     make_folder(&options.out)?;
@@ -93,14 +100,17 @@ pub(crate) fn run(context: &Context, options: &Gallery) -> Result<Ending, Error>
         kept: 0,
         missing: 0,
     };
-    for (figure, scene) in index.figures.iter().zip(&scenes) {
+    let count = index.figures.len();
+    for (at, (figure, scene)) in index.figures.iter().zip(&scenes).enumerate() {
         let wanted =
             options.only.is_empty() || options.only.iter().any(|name| figure.is_called(name));
         let record = if let Some(record) = records.of(&options.out, figure, scene) {
             report.kept += 1;
             record
         } else if wanted {
-            let record = picture(context, options, figure, scene, &stop)?;
+            let record = picture(context, options, (at + 1, count), figure, scene, &stop).map_err(
+                |error| error.within(format!("figure {} (`{}`)", figure.number, figure.scene)),
+            )?;
             records.keep(&options.out, record.clone())?;
             report.rendered += 1;
             record
@@ -115,21 +125,30 @@ pub(crate) fn run(context: &Context, options: &Gallery) -> Result<Ending, Error>
     Ok(Ending::Done)
 }
 
-/// The scene of a figure with what the index changes in it.
-fn scene_of(scenes: &Path, figure: &Figure) -> SceneOptions {
-    SceneOptions {
-        scene: scenes.join(&figure.scene),
+/// The scene of a figure with what the index and the size of its picture change in it.
+fn scene_of(options: &Gallery, figure: &Figure) -> Result<Scene, Error> {
+    let mut asked = SceneOptions {
+        scene: options.scenes.join(&figure.scene),
         resolution: None,
         rays: None,
         crop: None,
         set: figure.set.clone(),
+    };
+    readable(&asked.scene)?;
+    if !options.full {
+        let loaded =
+            scene::load(&asked.scene, &asked.overrides()).map_err(|error| mistakes(&error))?;
+        let (resolution, rays) = size::on_the_page(&loaded.description, figure);
+        (asked.resolution, asked.rays) = (Some(resolution), Some(rays));
     }
+    asked.load()
 }
 
 /// Renders the picture of one figure.
 fn picture(
     context: &Context,
     options: &Gallery,
+    place: (usize, usize),
     figure: &Figure,
     scene: &Scene,
     stop: &Stop,
@@ -165,13 +184,16 @@ fn picture(
         },
     };
     let total = scene.description().film.window.area();
-    let mut progress = Progress::new(context.output, total, 0);
+    let mut telling = Telling::new(context.output, figure, place, total);
     let outcome = crate::render::render(&plan, stop, |done, news| {
         if matches!(news, News::Progress) {
-            progress.update(done.pixels, &figure.name);
+            telling.update(done.pixels);
         }
     });
-    progress.finish();
+    telling.finish(match outcome {
+        Ok(_) => Picture::Done,
+        Err(_) => Picture::Failed,
+    });
     let outcome = outcome?;
     Ok(Record {
         name: figure.name.clone(),

@@ -34,6 +34,9 @@ pub(crate) struct Figure {
     /// Which of the scene's frames is shown.
     #[serde(default)]
     pub(crate) frame: u32,
+    /// Longest side of its picture on the page, in pixels, where the usual one would take too long.
+    #[serde(default)]
+    pub(crate) side: Option<u32>,
     /// What the page says about it.
     pub(crate) caption: String,
 }

@@ -147,6 +147,7 @@ mod tests {
             scene: "a.toml".into(),
             set: vec!["curves.x=1".into()],
             frame: 0,
+            side: None,
             caption: "Heights < 1 & rising.".into(),
         };
         let record = Record {

@@ -77,3 +77,37 @@ fn unknown_figures_and_missing_lists_are_told() {
         "{said}"
     );
 }
+
+#[test]
+fn pictures_are_small_unless_asked_for_in_full_and_a_log_gets_lines() {
+    let place = scenes();
+    place.write(
+        "scenes/figures/gallery.toml",
+        &INDEX
+            .replace("8x6", "600x20")
+            .replace("frame = 1", "frame = 2"),
+    );
+    let size = || {
+        let png = fs::read(place.path("gallery/small_0002.png")).unwrap();
+        [&png[16..20], &png[20..24]].map(|side| u32::from_be_bytes(side.try_into().unwrap()))
+    };
+    let (_, said) = place.ends(0, &["gallery"]);
+    assert_eq!(size(), [360, 12]);
+    for line in ["1 of 2: ball (1.1a): ", "2 of 2: small (1.1b): "] {
+        assert!(said.contains(line), "{said}");
+    }
+    let (_, said) = place.ends(0, &["gallery", "--full", "--output", "quiet"]);
+    assert_eq!(size(), [600, 20]);
+    assert_eq!(said, "");
+}
+
+#[test]
+fn a_picture_that_fails_names_its_figure_and_scene() {
+    let place = scenes();
+    place.write(
+        "scenes/figures/gallery.toml",
+        &INDEX.replace("frame = 1", "frame = 9"),
+    );
+    let (_, said) = place.ends(2, &["gallery"]);
+    assert!(said.contains("figure 1.1b (`ball.toml`): "), "{said}");
+}

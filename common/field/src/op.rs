@@ -228,6 +228,9 @@ ops! {
     /// A trivariate Bernstein polynomial, of which free-form deformations are made: three degrees, the box's least
     /// and greatest corner, control values with x fastest. Beyond the box it goes on as on its faces.
     Bernstein = 134 "bernstein" (Vector) Params::List => Scalar;
+    /// Where the points of a bent body come from (Barr 1984): its x (`part` 0) or z (`part` 1). It bends towards +x
+    /// by `rate` radians a metre between the heights `low` and `high`, and `centre` stays where it is.
+    Bend = 135 "bend" (Vector) Params::Named(&["part", "rate", "low", "high", "centre"]) => Scalar;
 
     /// The samples of file number `asset` at a place counted in samples: [`crate::grid`].
     Grid = 192 "grid" (Vector) Params::Named(&["asset", "edges", "degree"]) => Scalar;

@@ -6,9 +6,11 @@
 //! hint or made right: `1/3` divides exactly, `2^3` points to `**`, comparing a
 //! field points to `select`.
 
+mod bezier;
 mod cascades;
 mod grids;
 mod language;
+pub(crate) mod library;
 mod make;
 pub(crate) mod noises;
 mod options;
@@ -118,9 +120,13 @@ impl Fields {
     fn scalar(&self, result: &Dynamic) -> Result<NodeId, (String, &'static str)> {
         match Operand::from_dynamic(result) {
             Some(Operand::Scalar(id)) => Ok(id),
+            Some(Operand::Number(value)) if !value.is_finite() => Err((
+                format!("the expression is {value}, but a field is a finite number"),
+                "a number too large for 64 bits came up in what is computed here",
+            )),
             Some(Operand::Number(value)) => {
                 let node = self.shared.graph.borrow_mut().constant(value);
-                node.map_err(|error| (error.to_string(), "check the constants for a division by 0"))
+                node.map_err(|error| (error.to_string(), "check the numbers of the expression"))
             }
             Some(Operand::Vector(_)) => Err((
                 "the expression is a vector, but a field is a number at every point".into(),

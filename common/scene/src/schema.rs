@@ -17,8 +17,12 @@ pub fn schema() -> Value {
         json!("https://json-schema.org/draft/2020-12/schema"),
     );
     entries.insert("title".into(), json!("Flyby scene"));
-    // Not a keyword of the standard: validators pass over it, people and editors can read it.
+    // These are no keywords of the standard: validators pass over them, people and editors can read them.
     entries.insert("x-noises".into(), crate::expression::noises::described());
+    entries.insert(
+        "x-hypertextures".into(),
+        crate::expression::library::described(),
+    );
     schema
 }
 

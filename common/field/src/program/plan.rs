@@ -265,6 +265,7 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::Distances
         | Op::Convolution
         | Op::Bernstein
+        | Op::Bend
         | Op::Blend => unreachable!("functions of numbers and shapes are taken above"),
         Op::Grid | Op::SpectralTerrain | Op::Sea | Op::MidpointTerrain => {
             unreachable!("grids have surfaces")
@@ -294,9 +295,15 @@ fn scale_of(node: &Node, args: &[&Known]) -> f64 {
     };
     match node.op {
         Op::Position => 1.0,
-        Op::X | Op::Y | Op::Z | Op::Neg | Op::Abs | Op::OntoSphere | Op::OntoPlane | Op::Length => {
-            of(0)
-        }
+        Op::X
+        | Op::Y
+        | Op::Z
+        | Op::Neg
+        | Op::Abs
+        | Op::OntoSphere
+        | Op::OntoPlane
+        | Op::Length
+        | Op::Bend => of(0),
         Op::Vector => larger(larger(of(0), of(1)), of(2)),
         Op::VectorAdd | Op::VectorSub | Op::Add | Op::Sub | Op::Min | Op::Max => {
             larger(of(0), of(1))

@@ -4,6 +4,7 @@
 //! surfaces) with its list of constants. Each is written once, over [`Local`] numbers, and states
 //! its range and its slope over a region. What the constants mean is said where the shape is made.
 
+mod bend;
 mod bernstein;
 mod blend;
 mod blobs;
@@ -25,6 +26,7 @@ pub(crate) mod tests;
 use crate::interval::{Interval, larger};
 use crate::op::Op;
 use crate::range::Arithmetic;
+use bend::Bend;
 use bernstein::Bernstein;
 use blend::Blend;
 use blobs::Blobs;
@@ -47,6 +49,7 @@ pub(crate) enum Shape {
     Distances(Distances),
     Convolution(Convolution),
     Bernstein(Bernstein),
+    Bend(Bend),
     Blend(Blend),
 }
 
@@ -60,6 +63,7 @@ impl Shape {
             Op::Distances => Distances::new(params).map(Self::Distances),
             Op::Convolution => Convolution::new(params).map(Self::Convolution),
             Op::Bernstein => Bernstein::new(params).map(Self::Bernstein),
+            Op::Bend => Bend::new(params).map(Self::Bend),
             Op::Blend => Blend::new(params).map(Self::Blend),
             _ => return None,
         })
@@ -75,6 +79,7 @@ impl Shape {
             Self::Distances(shape) => shape.value(at),
             Self::Convolution(shape) => shape.value(at),
             Self::Bernstein(shape) => shape.value(at),
+            Self::Bend(shape) => shape.value(at),
             Self::Blend(shape) => {
                 let [a, b, _] = at;
                 shape.value(a, b)
@@ -91,6 +96,7 @@ impl Shape {
             Self::Distances(shape) => shape.bound(within),
             Self::Convolution(shape) => shape.bound(within),
             Self::Bernstein(shape) => shape.bound(within),
+            Self::Bend(shape) => shape.bound(within),
             Self::Blend(shape) => {
                 let [a, b, _] = within.parts;
                 Known {

@@ -129,6 +129,17 @@ pub(crate) fn zoo() -> Vec<(String, Graph, NodeId)> {
         ]
         .concat(),
     );
+    for (name, part, rate) in [
+        ("x", 0.0, 0.3),
+        ("z", 1.0, 0.3),
+        ("z, to the left", 1.0, -0.25),
+    ] {
+        add(
+            &format!("bend {name}"),
+            Op::Bend,
+            &[part, rate, -1.2, 2.0, 0.4],
+        );
+    }
     for (name, kernel, list) in skeletons() {
         for far in [0.0, 1.0] {
             let mut params = vec![kernel, 0.6, far];
@@ -404,6 +415,70 @@ fn control_values_along_a_line_give_that_line() {
     }
 }
 
+/// Where Barr's bend puts a point of the straight body: the definition that [`Op::Bend`] undoes.
+fn bent([x, y, z]: [f64; 3], [rate, low, high, centre]: [f64; 4]) -> [f64; 3] {
+    let held = z.clamp(low, high);
+    let (axis, angle) = (1.0 / rate, rate * (held - centre));
+    let (cos, sin) = (libm::cos(angle), libm::sin(angle));
+    [
+        axis - (axis - x) * cos + (z - held) * sin,
+        y,
+        centre + (axis - x) * sin + (z - held) * cos,
+    ]
+}
+
+#[test]
+fn a_bend_is_undone() {
+    for rules in [
+        [0.8, -1.0, 1.5, 0.0],
+        [-0.7, -1.0, 1.5, 0.3],
+        [1.0, -3.0, 3.0, 0.0],
+        [1e-3, -10.0, 10.0, -10.0],
+    ] {
+        let straight: Vec<[f64; 3]> = (0..400)
+            .map(|i| [0, 1, 2].map(|k| 4.0 * unit(hash(&[i, k, 79])) - 2.0))
+            .map(|[x, y, z]| [0.45 * x, y, z])
+            .collect();
+        let places: Vec<[f64; 3]> = straight.iter().map(|p| bent(*p, rules)).collect();
+        let part = |part: f64| {
+            let [rate, low, high, centre] = rules;
+            values(Op::Bend, &[part, rate, low, high, centre], &places)
+        };
+        let (x, z) = (part(0.0), part(1.0));
+        for (i, p) in straight.iter().enumerate() {
+            assert!(
+                (x[i] - p[0]).abs() < 1e-11 && (z[i] - p[2]).abs() < 1e-11,
+                "{rules:?} at {p:?}: {} and {}",
+                x[i],
+                z[i]
+            );
+        }
+    }
+}
+
+#[test]
+fn a_bend_jumps_on_the_far_side_of_its_axis_and_says_so() {
+    let params = [1.0, 0.5, -1.0, 1.0, 0.0];
+    let Some(Ok(bend)) = super::Shape::new(Op::Bend, &params) else {
+        panic!("it is a bend")
+    };
+    let known = |x: [f64; 2], z: [f64; 2]| {
+        let zero = Interval::point(0.0);
+        bend.known([Interval::new(x[0], x[1]), zero, Interval::new(z[0], z[1])])
+    };
+    let across = values(Op::Bend, &params, &[[4.0, 0.0, -1e-9], [4.0, 0.0, 1e-9]]);
+    assert!(across[1] - across[0] > 1.0, "{across:?}");
+    let jump = known([3.5, 4.5], [-0.1, 0.1]);
+    assert_eq!(jump.slope, f64::INFINITY);
+    assert!(jump.range.contains(across[0]) && jump.range.contains(across[1]));
+    // Beside it, beyond an end, nothing is stretched; between the ends what is close to the axis is.
+    assert!((known([3.5, 4.5], [0.1, 0.2]).slope - 1.0).abs() < 1e-6);
+    assert!((known([0.9, 1.0], [-0.1, 0.1]).slope - 2.0).abs() < 1e-6);
+    // Ranges close in on values.
+    let small = known([-0.3, -0.299], [0.7, 0.701]);
+    assert!(small.range.width() < 2e-3, "{small:?}");
+}
+
 #[test]
 fn beyond_the_supports_the_far_field_is_a_distance() {
     // Thesis eq. (7.9): 0.5 + ‖x − xᵢ‖ − Rᵢ of the nearest ball.
@@ -487,6 +562,16 @@ fn wrong_constants_are_refused_with_sentences() {
             Op::Blobs,
             &[9.0, 0.5, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0],
             "`blobs` wants a kernel, not 9",
+        ),
+        (
+            Op::Bend,
+            &[0.0, 2.0, -1.0, 2.0, 0.0],
+            "`bend` wants less than half a turn on each side of its centre, not 4",
+        ),
+        (
+            Op::Bend,
+            &[0.0, 1.0, -1.0, 2.0, 3.0],
+            "`bend` wants a low below its high, and its centre between them, not 3",
         ),
     ] {
         let mut graph = Graph::new();

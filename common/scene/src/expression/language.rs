@@ -9,6 +9,7 @@ use rhai::{Array, Dynamic, Engine, FLOAT, INT, Map, OptimizationLevel};
 use super::Shared;
 use super::cascades::CASCADES;
 use super::grids;
+use super::library::LIBRARY;
 use super::noises::NOISES;
 use super::refusal;
 use super::shapes;
@@ -67,6 +68,7 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "blobs",
     "distances",
     "convolution",
+    "bezier_tetrahedra",
     "union",
     "intersection",
     "difference",
@@ -74,7 +76,16 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "morph",
     "twist",
     "taper",
+    "bend",
     "free_form",
+    "hills",
+    "mountains",
+    "canyons",
+    "dunes",
+    "craters",
+    "boulders",
+    "flames",
+    "mud",
 ];
 
 /// Symbols that are refused while parsing; [`refusal`] says what to use instead.
@@ -99,6 +110,10 @@ pub(super) const REFUSED: &[&str] = &[
     "private",
     "is_shared",
 ];
+
+/// What a division by a constant 0 is told.
+pub(super) const BY_ZERO: &str = "this divides by zero";
+pub(super) const BY_ZERO_HELP: &str = "check what stands below the `/`";
 
 /// An engine without anything but this language.
 pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
@@ -126,6 +141,7 @@ pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
     solids::register(&mut engine, shared);
     grids::register(&mut engine, shared);
     noises(&mut engine, shared);
+    library(&mut engine, shared);
     names(&mut engine, shared);
     engine
 }
@@ -137,7 +153,7 @@ fn limit(engine: &mut Engine) {
     engine.set_max_expr_depths(64, 32);
     engine.set_max_string_size(1024);
     engine.set_max_array_size(1024);
-    engine.set_max_map_size(64);
+    engine.set_max_map_size(1024);
     engine.set_max_variables(256);
     engine.set_max_functions(64);
     engine.set_max_modules(0);
@@ -152,7 +168,7 @@ fn limit(engine: &mut Engine) {
 fn numbers(engine: &mut Engine) {
     let divide = |a: FLOAT, b: FLOAT| -> Made<FLOAT> {
         if b == 0.0 {
-            return refuse("this divides by zero", "check what stands below the `/`");
+            return refuse(BY_ZERO, BY_ZERO_HELP);
         }
         Ok(a / b)
     };
@@ -345,6 +361,19 @@ fn cascades(engine: &mut Engine, shared: &Rc<Shared>) {
         let s = shared.clone();
         engine.register_fn(cascade.name, move |v: Dynamic, options: Map| {
             s.cascade(cascade, &v, &options)
+        });
+    }
+}
+
+fn library(engine: &mut Engine, shared: &Rc<Shared>) {
+    for ready in LIBRARY {
+        let s = shared.clone();
+        engine.register_fn(ready.name, move |v: Dynamic| {
+            s.ready(ready, &v, &Map::new())
+        });
+        let s = shared.clone();
+        engine.register_fn(ready.name, move |v: Dynamic, options: Map| {
+            s.ready(ready, &v, &options)
         });
     }
 }

@@ -40,7 +40,9 @@ impl Shared {
     pub(super) fn scalar(&self, function: &str, operand: Operand) -> Made<NodeId> {
         match operand {
             Operand::Scalar(id) => Ok(id),
-            Operand::Number(value) => self.push(Op::Constant, &[], &[value]),
+            Operand::Number(value) => {
+                self.push(Op::Constant, &[], &[Self::finite(function, value)?])
+            }
             Operand::Vector(_) => refuse(
                 format!("`{function}` wants a number here, not a vector"),
                 "take a component such as p.x, or length(...)",
@@ -62,7 +64,7 @@ impl Shared {
     /// A number that must be known when the scene is read.
     pub(super) fn constant(function: &str, value: &Dynamic) -> Made<f64> {
         match Self::operand(function, value)? {
-            Operand::Number(number) => Ok(number),
+            Operand::Number(number) => Self::finite(function, number),
             other => refuse(
                 format!(
                     "`{function}` wants a constant number here, not {}",
@@ -71,6 +73,17 @@ impl Shared {
                 "only constants and what is computed from them",
             ),
         }
+    }
+
+    /// A number that a field can hold; `function` is what was to take it.
+    pub(super) fn finite(function: &str, number: f64) -> Made<f64> {
+        if number.is_finite() {
+            return Ok(number);
+        }
+        refuse(
+            format!("`{function}` is given a number that is {number}: numbers must be finite"),
+            "a number too large for 64 bits came up in what is computed here",
+        )
     }
 
     /// A function of scalars: of numbers alone it is computed at once.
@@ -121,6 +134,9 @@ impl Shared {
             }
             (Op::Mul, Operand::Vector(vector), factor)
             | (Op::Mul, factor, Operand::Vector(vector)) => self.scaled(vector, factor)?,
+            (Op::Div, _, Operand::Number(0.0)) => {
+                return refuse(super::language::BY_ZERO, super::language::BY_ZERO_HELP);
+            }
             (Op::Div, Operand::Vector(vector), Operand::Number(by)) => {
                 self.scaled(vector, Operand::Number(1.0 / by))?
             }

@@ -259,6 +259,9 @@ fn usage(name: &str) -> String {
         }
         "sea" => "sea(p, #{size: 256, spacing: 1, wind: 10})",
         "midpoint_terrain" => "midpoint_terrain(p, #{levels: 8, width: 1000, hurst: 0.8})",
+        "hills" | "mountains" | "canyons" | "dunes" | "craters" | "boulders" | "flames" | "mud" => {
+            return format!("it is used like {name}(base, #{{amplitude: 10, scale: 100, key: 1}})");
+        }
         "cellular" => "cellular(p, #{order: 1, norm: 2, key: 3})",
         "spot" => "spot(p, #{stretch: 3, variety: 0.5, axis: [1, 0, 0]})",
         "sparse" => "sparse(p, #{nodes: 2, kernel: \"quintic\", key: 3})",
@@ -281,6 +284,9 @@ fn usage(name: &str) -> String {
         "superquadric" => "superquadric(#{e1: 1, e2: 1, size: [1, 1, 1]})",
         "sphere" => "sphere(#{radius: 1, exponent: 0.5})",
         "blobs" => "blobs([[x, y, z, radius, weight], ...], #{kernel: \"wyvill\"})",
+        "bezier_tetrahedra" => {
+            "bezier_tetrahedra([#{corners: [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], values: [1, -1, -1, -1]}])"
+        }
         "distances" | "convolution" => {
             return format!(
                 "it is used like {name}([#{{line: [[0, 0, 0], [1, 0, 0]]}}], #{{radius: 0.5}})"
@@ -295,6 +301,7 @@ fn usage(name: &str) -> String {
         "free_form" => {
             "free_form(p, [[dx, dy, dz], ...], #{min: [-1, -1, -1], max: [1, 1, 1], counts: [2, 2, 2]})"
         }
+        "bend" => "bend(p, #{rate: 0.5, low: -1, high: 1})",
         "taper" => "taper(p, #{low: -1, high: 1, scale: [1, 0.5]})",
         "length" | "onto_plane" => return format!("it is used like {name}(p)"),
         other => return format!("it is used like {other}(x)"),

@@ -6,6 +6,7 @@ use field::{NodeId, Op};
 use rhai::{Array, Dynamic, Engine, Map};
 
 use super::Shared;
+use super::bezier;
 use super::options::{self, Options};
 use super::skeletons;
 use super::values::{Made, Operand, Vector, refuse};
@@ -38,6 +39,10 @@ const LISTED: &[Listed] = &[
     Listed {
         name: "convolution",
         make: skeletons::convolution,
+    },
+    Listed {
+        name: "bezier_tetrahedra",
+        make: bezier::tetrahedra,
     },
 ];
 

@@ -71,6 +71,8 @@ pub(super) fn register(engine: &mut Engine, shared: &Rc<Shared>) {
     });
     let s = shared.clone();
     engine.register_fn("taper", move |at: Dynamic, given: Map| s.taper(&at, &given));
+    let s = shared.clone();
+    engine.register_fn("bend", move |at: Dynamic, given: Map| s.bend(&at, &given));
 }
 
 impl Shared {
@@ -186,6 +188,23 @@ impl Shared {
             self.push(Op::Div, &[y, scale], &[])?,
         );
         Ok(Operand::Vector(self.push(Op::Vector, &[u, v, z], &[])?).into_dynamic())
+    }
+
+    /// Undoes a bend of what stands along z (Barr 1984): towards +x, by `rate` radians a metre between `low` and
+    /// `high`. What is at the height `centre` stays where it is, and beyond both ends the body goes on straight.
+    fn bend(&self, at: &Dynamic, given: &Map) -> Made<Dynamic> {
+        let at = Self::vector("bend", at)?;
+        let options = Options::new("bend", &["rate", "low", "high", "centre"], given)?;
+        let (low, high) = (options.number("low", -1.0)?, options.number("high", 1.0)?);
+        let rate = options.number("rate", 0.5)?;
+        let centre = options.number("centre", 0.5 * (low + high))?;
+        if rate == 0.0 {
+            return Ok(Operand::Vector(at).into_dynamic());
+        }
+        let part = |part: f64| self.push(Op::Bend, &[at], &[part, rate, low, high, centre]);
+        let y = self.push(Op::Y, &[at], &[])?;
+        let straight = self.push(Op::Vector, &[part(0.0)?, y, part(1.0)?], &[])?;
+        Ok(Operand::Vector(straight).into_dynamic())
     }
 
     /// Moves the place by a free-form deformation (Sederberg and Parry 1986): a lattice of displacements over a

@@ -186,6 +186,8 @@ fn shapes_take_places_lists_and_options() {
         ),
         ("blend(p.x, p.y, 0.1)", "blend(p.x, p.y)"),
         ("morph(p.x, p.y, 0.25)", "(p.x + ((p.y - p.x)*0.25))"),
+        ("bend(p, #{rate: 0.5}).z", "vec(bend(p), p.y, bend(p)).z"),
+        ("bend(p, #{rate: 0}).z", "p.z"),
         (
             "length(twist(p, 2))",
             "length(vec(((p.x*cos((p.z*2))) + (p.y*sin((p.z*2)))), ((p.y*cos((p.z*2))) - (p.x*sin((p.z*2)))), p.z))",
@@ -253,6 +255,30 @@ fn shapes_take_places_lists_and_options() {
             "`bernstein` wants one control value for each point of its lattice, not 1",
         ),
         (
+            "bezier_tetrahedra([])",
+            "`bezier_tetrahedra` wants at least one tetrahedron",
+        ),
+        (
+            "bezier_tetrahedra([#{corners: [[0,0,0],[1,0,0],[0,1,0],[0,0,1]], values: [1, 2, 3]}])",
+            "a tetrahedron of `bezier_tetrahedra` cannot have 3 values",
+        ),
+        (
+            "bezier_tetrahedra([#{corners: [[0,0,0],[1,0,0],[0,1,0]], values: [1, 2, 3, 4]}])",
+            "a tetrahedron of `bezier_tetrahedra` has four corners",
+        ),
+        (
+            "bezier_tetrahedra([#{corners: [[0,0,0],[1,0,0],[0,1,0],[1,1,0]], values: [1, 2, 3, 4]}])",
+            "the corners of a tetrahedron of `bezier_tetrahedra` lie in one plane",
+        ),
+        (
+            "bezier_tetrahedra([#{values: [1, 2, 3, 4]}])",
+            "a tetrahedron of `bezier_tetrahedra` has corners and values",
+        ),
+        (
+            "bezier_tetrahedra([1], #{thickness: -1})",
+            "`bezier_tetrahedra` wants a thickness of 0 or above, not -1",
+        ),
+        (
             "union(p.x, p.y, #{width: 1, sharpness: 2})",
             "`union` takes a sharpness or a width, not both",
         ),
@@ -264,6 +290,15 @@ fn shapes_take_places_lists_and_options() {
         (
             "length(taper(p, #{low: 1, high: 0}))",
             "`taper` wants its low below its high, not 1 and 0",
+        ),
+        (
+            "length(bend(p, #{rate: 3, high: 2, centre: 0}))",
+            "`bend` wants less than half a turn on each side of its centre, not 6",
+        ),
+        ("length(bend(p, #{rat: 3}))", "`bend` has no option `rat`"),
+        (
+            "length(bend(p, #{rate: t}))",
+            "`bend: rate` wants a constant number here, not a field",
         ),
     ] {
         assert_eq!(refused(text).message, message, "{text}");
@@ -531,6 +566,16 @@ fn what_rhai_gets_silently_wrong_is_refused_with_a_way_out() {
             Some("check what stands below the `/`"),
         ),
         (
+            "seed + p.x/(2 - 2)",
+            "this divides by zero",
+            Some("check what stands below the `/`"),
+        ),
+        (
+            "length(p/0)",
+            "this divides by zero",
+            Some("check what stands below the `/`"),
+        ),
+        (
             "2**p.x",
             "2 cannot be raised to a field",
             Some("the exponent must be a constant; exp(x * 0.693147) is 2**x"),
@@ -583,7 +628,7 @@ fn mistakes_have_sentences_and_places() {
         ),
         (
             "exp(1e9)",
-            "a constant of `constant` is inf; constants must be finite",
+            "the expression is inf, but a field is a finite number",
             None,
         ),
         (
@@ -633,6 +678,67 @@ fn mistakes_have_sentences_and_places() {
     );
 }
 
+/// What a hostile script is told, and at which line and column of it.
+#[test]
+fn hostile_scripts_are_told_where_they_go_wrong() {
+    for (text, message, position) in [
+        (
+            "fn f(x) { f(x) + f(x) } f(1)",
+            "the functions of the expression call each other too deeply",
+            Some((1, 25)),
+        ),
+        (
+            "let i = 0;\nwhile true { i += 1 }",
+            "the expression takes too many steps",
+            Some((2, 19)),
+        ),
+        (
+            "let a = [1];\nfor i in 0..64 { a += a; } 1",
+            "an array in the expression grows too large",
+            Some((2, 20)),
+        ),
+        (
+            "let f = p.x;\nfor i in 0..10000000 { f += sin(i*f) } f",
+            "the field is nested more than 4096 operations deep",
+            Some((2, 29)),
+        ),
+        (
+            "for i in 0..10000000 { let f = p.x*i; }\np.z",
+            "the field has more than 65536 operations",
+            Some((1, 35)),
+        ),
+        (
+            "let n = 1e300*1e300;\nnoise((n - n)*p)",
+            "`*` is given a number that is NaN: numbers must be finite",
+            Some((2, 14)),
+        ),
+        (
+            "fbm(p, #{hurst: 1e300*1e300})",
+            "`fbm: hurst` is given a number that is inf: numbers must be finite",
+            Some((1, 1)),
+        ),
+        (
+            "blobs([[0, 0, 1e300*1e300]])",
+            "`blobs` is given a number that is inf: numbers must be finite",
+            Some((1, 1)),
+        ),
+        (
+            "let n = 1e300*1e300; n - n",
+            "the expression is NaN, but a field is a finite number",
+            None,
+        ),
+    ] {
+        let begun = Instant::now();
+        let refusal = refused(text);
+        assert_eq!(
+            (refusal.message.as_str(), refusal.position),
+            (message, position),
+            "{text}"
+        );
+        assert!(begun.elapsed() < Duration::from_secs(5), "{text}");
+    }
+}
+
 #[test]
 fn hostile_scripts_end_soon() {
     let long_sum = vec!["p.x"; 15_000].join("+");
@@ -658,7 +764,6 @@ fn hostile_scripts_end_soon() {
         "let f = p.x; for i in 0..100000 { f = noise(i*p) } f",
         "let n = 1; for i in 0..64 { n = n*1000000 } n",
         "let n = 1e300; for i in 0..64 { n = n*n } n",
-        "let n = 1e300*1e300; n - n",
         "9223372036854775807 + 1",
         "-(-9223372036854775807 - 1)",
         "p.x[3]",
@@ -689,6 +794,69 @@ fn doubling_sixty_four_times_is_small() {
     let script = "let x = p.x; for i in 0..64 { x = x + x } x";
     fields.field(script).unwrap();
     assert!(fields.into_graph().nodes().len() < 70);
+}
+
+#[test]
+fn ready_hypertextures_are_adjusted_by_options() {
+    let names = [
+        "hills",
+        "mountains",
+        "canyons",
+        "dunes",
+        "craters",
+        "boulders",
+        "flames",
+        "mud",
+    ];
+    assert_eq!(names.len(), library::LIBRARY.len());
+    for (name, ready) in names.into_iter().zip(library::LIBRARY) {
+        assert_eq!(name, ready.name);
+        assert!(is_taken(name), "{name}");
+        let fields = fields();
+        let default = fields.field(&format!("{name}(base)")).unwrap();
+        let same = fields.field(&format!("{name}(base, #{{key: 0}})")).unwrap();
+        assert_eq!(default, same, "{name}");
+        let mut seen = vec![default];
+        for option in [
+            "key: 1",
+            "amplitude: 3.5",
+            "scale: 77",
+            "octaves: 2",
+            "amplitude: wave",
+        ] {
+            let other = fields
+                .field(&format!("{name}(base, #{{{option}}})"))
+                .unwrap();
+            assert!(!seen.contains(&other), "{name} {option}");
+            seen.push(other);
+        }
+        for (text, message) in [
+            (
+                format!("{name}(base, #{{ke: 1}})"),
+                format!("`{name}` has no option `ke`"),
+            ),
+            (
+                format!("{name}(3)"),
+                format!("`{name}` wants a vector here, not a number"),
+            ),
+            (
+                format!("{name}(base, #{{scale: 0}})"),
+                format!("`{name}` wants a scale above 0, not 0"),
+            ),
+            (
+                format!("{name}(base, #{{key: -1}})"),
+                format!("`{name}` wants a key from 0 to 4294967231, not -1"),
+            ),
+            (
+                format!("{name}(base, #{{scale: wave}})"),
+                format!("`{name}: scale` wants a constant number here, not a field"),
+            ),
+        ] {
+            let refusal = refused(&text);
+            assert_eq!(refusal.message, message);
+            assert!(refusal.position.is_some());
+        }
+    }
 }
 
 #[test]

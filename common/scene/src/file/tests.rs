@@ -799,7 +799,8 @@ fn scenes_in_the_repository_load() {
     let mut count = 0;
     let entries = fs::read_dir(&folder).unwrap();
     let figures = fs::read_dir(folder.join("figures")).unwrap();
-    for entry in entries.chain(figures) {
+    let library = fs::read_dir(folder.join("library")).unwrap();
+    for entry in entries.chain(figures).chain(library) {
         let path = entry.unwrap().path();
         let list = path.ends_with("gallery.toml");
         if path.extension().is_some_and(|ending| ending == "toml") && !list {
