@@ -65,6 +65,9 @@ pub(crate) struct Statistics {
     per_ray: PerRay,
     /// Seconds of each part of the work, summed over the threads.
     seconds: Map<String, Value>,
+    /// The same, in the order of the work.
+    #[serde(skip)]
+    parts: Vec<(&'static str, f64)>,
 }
 
 /// What a ray took on average, whether from the camera or towards the sun.
@@ -85,13 +88,15 @@ struct PerRay {
 impl Statistics {
     /// The report of what was counted and measured.
     pub(crate) fn new(counts: &Counts, spent: &Spent) -> Self {
-        let seconds = spent.seconds().into_iter();
+        let parts = spent.seconds();
         Self {
             counts: by_name(counts),
             per_ray: PerRay::of(counts),
-            seconds: seconds
-                .map(|(name, seconds)| (name.to_owned(), seconds.into()))
+            seconds: parts
+                .iter()
+                .map(|&(name, seconds)| (name.to_owned(), seconds.into()))
                 .collect(),
+            parts,
         }
     }
 
@@ -112,16 +117,12 @@ impl Statistics {
             "per ray: {evaluations:.2} evaluations ({noise_evaluations:.1} of noises), {steps:.2} steps, \
              {backtracks:.3} of them back, {subdivisions:.3} subdivisions"
         )?;
-        let parts = || {
-            let parts = self.seconds.iter();
-            parts.map(|(name, seconds)| (name, seconds.as_f64().unwrap_or_default()))
-        };
-        let total: f64 = parts().map(|(_, seconds)| seconds).sum();
+        let total: f64 = self.parts.iter().map(|(_, seconds)| seconds).sum();
         let mut table = columns(["part", "seconds", "share"]);
-        for (name, seconds) in parts() {
+        for &(name, seconds) in &self.parts {
             let share = if total > 0.0 { seconds / total } else { 0.0 };
             table.add_row([
-                name.clone(),
+                name.to_owned(),
                 format!("{seconds:.3}"),
                 format!("{:.1} %", 100.0 * share),
             ]);
