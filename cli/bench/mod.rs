@@ -1,10 +1,11 @@
 //! What `flyby bench` measures: [`thesis`] fixes what is cast at what, [`cast`] counts, [`report`] prints;
-//! [`peers`] compares this renderer with other programs.
+//! [`peers`] compares this renderer with other programs, [`threads`] threads with processes.
 
 pub(crate) mod cast;
 pub(crate) mod peers;
 pub(crate) mod report;
 pub(crate) mod thesis;
+pub(crate) mod threads;
 
 #[cfg(test)]
 mod tests;

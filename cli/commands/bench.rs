@@ -1,6 +1,7 @@
 //! `flyby bench`: measurements beside those of the reference documents.
 
 mod peers;
+mod threads;
 
 use clap::{Args, Subcommand};
 use field::{Interval, Program};
@@ -19,6 +20,8 @@ pub(crate) enum BenchCommand {
     Thesis(Options),
     /// Times of one thread beside other programs' on the same surfaces, in turns.
     Peers(peers::Options),
+    /// Threads of one process beside as many processes of one thread at the same time.
+    Threads(threads::Options),
 }
 
 #[derive(Args, Debug)]
@@ -49,6 +52,7 @@ pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Er
             Ok(Ending::Done)
         }
         BenchCommand::Peers(options) => peers::run(context, &options),
+        BenchCommand::Threads(options) => threads::run(context, &options),
     }
 }
 

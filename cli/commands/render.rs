@@ -8,7 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use image::{Format, FrameMetadata, Opened};
 use model::{Digest, ImageNumber, Resolution};
-use render::{Counts, EvalSettings, SimdLevel};
+use render::{EvalSettings, SimdLevel};
 use serde::Serialize;
 
 use super::job::make_folder;
@@ -20,7 +20,7 @@ use crate::movie::{self, Movie};
 use crate::options::{Context, FileOptions, FrameOptions, SceneOptions};
 use crate::output::{self, Report, say};
 use crate::progress::{Progress, amount, duration};
-use crate::render::{Done, News, Outcome, Plan};
+use crate::render::{Done, News, Outcome, Plan, Statistics};
 use crate::stop::Stop;
 use crate::values;
 
@@ -39,7 +39,7 @@ pub(crate) struct Render {
     #[command(flatten)]
     files: FileOptions,
 
-    /// Also report what was counted: rays, evaluations, steps.
+    /// Also report what was counted (rays, evaluations, steps), averages per ray, and time by part.
     #[arg(long, help_heading = "Results")]
     stats: bool,
 
@@ -83,8 +83,8 @@ struct RenderReport {
     seconds: f64,
     /// Render threads.
     threads: usize,
-    /// What was counted in this run, where `--stats` asks for it.
-    statistics: Option<serde_json::Map<String, serde_json::Value>>,
+    /// What was counted and measured in this run, where `--stats` asks for it.
+    statistics: Option<Statistics>,
     /// The movie, where one was made.
     movie: Option<PathBuf>,
 }
@@ -168,7 +168,9 @@ pub(crate) fn run(context: &Context, options: &Render) -> Result<Ending, Error> 
         pixels_kept: outcome.pixels_found,
         seconds: outcome.wall.as_secs_f64(),
         threads: plan.threads,
-        statistics: options.stats.then(|| statistics(&outcome.counts)),
+        statistics: options
+            .stats
+            .then(|| Statistics::new(&outcome.counts, &outcome.spent)),
         movie,
         folder,
     };
@@ -285,14 +287,6 @@ fn frames(
     frames.collect()
 }
 
-/// Counts by name.
-pub(crate) fn statistics(counts: &Counts) -> serde_json::Map<String, serde_json::Value> {
-    let named = counts.named().into_iter();
-    named
-        .map(|(name, count)| (name.to_owned(), count.into()))
-        .collect()
-}
-
 impl Report for RenderReport {
     fn table(&self, out: &mut dyn Write) -> io::Result<()> {
         writeln!(
@@ -310,8 +304,8 @@ impl Report for RenderReport {
             self.threads,
             &self.scene_digest[..16]
         )?;
-        for (name, count) in self.statistics.iter().flatten() {
-            writeln!(out, "  {name:<20} {count:>16}")?;
+        if let Some(statistics) = &self.statistics {
+            statistics.table(out)?;
         }
         if let Some(movie) = &self.movie {
             writeln!(out, "movie {}", movie.display())?;

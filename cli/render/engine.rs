@@ -5,9 +5,9 @@
 //! its last block, while the others render the next image.
 
 use std::path::PathBuf;
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::sync::{LockResult, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -20,6 +20,7 @@ use render::{Assets, Counts, EvalSettings, ImageRenderer};
 use scene::Description;
 
 use super::line::{Line, Next, last};
+use super::statistics::{Spent, by_name, clock};
 use crate::error::Error;
 use crate::stop::Stop;
 
@@ -80,6 +81,8 @@ pub(crate) struct Outcome {
     pub(crate) frames: Vec<(ImageNumber, FinishedFrame)>,
     /// Work done in this run.
     pub(crate) counts: Counts,
+    /// Where its time went.
+    pub(crate) spent: Spent,
     /// Blocks rendered in this run.
     pub(crate) blocks: u64,
     /// Whole blocks found in scratch files.
@@ -114,6 +117,7 @@ struct Shared<'a> {
     blocks: AtomicU64,
     blocks_found: AtomicU64,
     rays: AtomicU64,
+    spent: Mutex<Spent>,
 }
 
 /// Renders what the plan says; `tell` hears of it on the calling thread.
@@ -135,10 +139,12 @@ pub(crate) fn render(
         blocks: AtomicU64::new(0),
         blocks_found: AtomicU64::new(0),
         rays: AtomicU64::new(0),
+        spent: Mutex::default(),
     };
     let mut outcome = Outcome {
         frames: Vec::new(),
         counts: Counts::default(),
+        spent: Spent::default(),
         blocks: 0,
         blocks_found: 0,
         pixels_found: 0,
@@ -150,7 +156,11 @@ pub(crate) fn render(
         for number in 0..plan.threads.max(1) {
             let (shared, events) = (&shared, events.clone());
             let thread = thread::Builder::new().name(format!("render-{number}"));
-            let spawned = thread.spawn_scoped(scope, move || shared.work(&events));
+            let spawned = thread.spawn_scoped(scope, move || {
+                let mut spent = Spent::default();
+                shared.work(&events, &mut spent);
+                *unpoisoned(shared.spent.lock()) += spent;
+            });
             if let Err(error) = spawned {
                 shared.end();
                 failure = Some(Error::failed("cannot start a render thread").because(error));
@@ -169,6 +179,7 @@ pub(crate) fn render(
     }
     outcome.frames.sort_by_key(|(image, _)| *image);
     outcome.wall = started.elapsed();
+    outcome.spent = unpoisoned(shared.spent.into_inner());
     outcome.pixels_found = shared.pixels_found.into_inner();
     outcome.blocks = shared.blocks.into_inner();
     outcome.blocks_found = shared.blocks_found.into_inner();
@@ -220,18 +231,22 @@ impl Shared<'_> {
         }
     }
 
-    /// One thread's life.
-    fn work(&self, events: &Sender<Event>) {
+    /// One thread's life, and where its time went.
+    fn work(&self, events: &Sender<Event>, spent: &mut Spent) {
         let mut buffers = Buffers::default();
         loop {
             let done = match self.line.next() {
                 Next::End => return,
-                Next::Open(image) => self.open(image, events),
+                Next::Open(image) => timed(&mut spent.preparation, || self.open(image, events)),
                 Next::Block(work, block) => self
-                    .block(&work, block, &mut buffers)
+                    .block(&work, block, &mut buffers, spent)
                     .map(|()| last(work).filter(|work| work.scratch.is_complete())),
             };
-            let told = match done.and_then(|work| work.map(|work| self.finish(work)).transpose()) {
+            let finished = done.and_then(|work| {
+                work.map(|work| timed(&mut spent.encoding, || self.finish(work)))
+                    .transpose()
+            });
+            let told = match finished {
                 Ok(None) => Ok(()),
                 Ok(Some(event)) => events.send(event),
                 Err(error) => {
@@ -286,24 +301,32 @@ impl Shared<'_> {
     }
 
     /// Renders one block into its place; one that was cancelled leaves nothing.
-    fn block(&self, work: &Work, block: Rect, buffers: &mut Buffers) -> Result<(), Error> {
+    fn block(
+        &self,
+        work: &Work,
+        block: Rect,
+        buffers: &mut Buffers,
+        spent: &mut Spent,
+    ) -> Result<(), Error> {
         let Buffers { pixels, payload } = buffers;
-        let rendered = work.renderer.render_block(block, &self.halt, pixels);
-        let Ok(counts) = rendered else {
+        let renderer = &work.renderer;
+        let rendered = renderer.render_block_timed(block, &self.halt, pixels, clock);
+        let Ok((counts, times)) = rendered else {
             return Ok(());
         };
-        payload.clear();
-        payload.extend(pixels.iter().flat_map(|value| value.to_le_bytes()));
-        work.scratch.write_block(block, payload).map_err(|error| {
+        spent.blocks += times;
+        let stored = timed(&mut spent.storing, || {
+            payload.clear();
+            payload.extend(pixels.iter().flat_map(|value| value.to_le_bytes()));
+            work.scratch.write_block(block, payload)
+        });
+        stored.map_err(|error| {
             Error::failed(format!("cannot keep a part of frame {}", work.image)).because(error)
         })?;
         self.pixels.fetch_add(block.area(), Ordering::Relaxed);
         self.blocks.fetch_add(1, Ordering::Relaxed);
         self.rays.fetch_add(counts.rays, Ordering::Relaxed);
-        *work
-            .counts
-            .lock()
-            .unwrap_or_else(std::sync::PoisonError::into_inner) += counts;
+        *unpoisoned(work.counts.lock()) += counts;
         Ok(())
     }
 
@@ -311,17 +334,14 @@ impl Shared<'_> {
     fn finish(&self, work: Work) -> Result<Event, Error> {
         let plan = self.plan;
         let image = work.image;
-        let counts = work
-            .counts
-            .into_inner()
-            .unwrap_or_else(std::sync::PoisonError::into_inner);
+        let counts = unpoisoned(work.counts.into_inner());
         let request = FrameRequest {
             folder: plan.folder.clone(),
             stem: plan.stem.clone(),
             number: image,
             formats: plan.formats,
             metadata: FrameMetadata {
-                statistics: statistics(&counts),
+                statistics: serde_json::Value::Object(by_name(&counts)).to_string(),
                 ..plan.metadata.clone()
             },
             view: ViewTransform {
@@ -342,14 +362,17 @@ struct Buffers {
     payload: Vec<u8>,
 }
 
-/// Counts as a frame's metadata holds them.
-fn statistics(counts: &Counts) -> String {
-    let named: serde_json::Map<String, serde_json::Value> = counts
-        .named()
-        .into_iter()
-        .map(|(name, count)| (name.to_owned(), count.into()))
-        .collect();
-    serde_json::Value::Object(named).to_string()
+/// Does something and adds how long it took.
+fn timed<T>(spent: &mut Duration, what: impl FnOnce() -> T) -> T {
+    let started = Instant::now();
+    let done = what();
+    *spent += started.elapsed();
+    done
+}
+
+/// What a lock holds: sums, which a thread that panicked leaves whole.
+fn unpoisoned<T>(locked: LockResult<T>) -> T {
+    locked.unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Cuts what is left of a window along tiles, and puts it into their order.

@@ -1,6 +1,8 @@
-//! Rendering in this process: `line` says which block is next, `engine` renders it.
+//! Rendering in this process: `line` says which block is next, `engine` renders it, `statistics` says what it took.
 
 mod engine;
 mod line;
+mod statistics;
 
 pub(crate) use engine::{Done, News, Outcome, Plan, render};
+pub(crate) use statistics::Statistics;

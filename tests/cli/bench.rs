@@ -1,4 +1,4 @@
-//! `flyby bench`: tables beside the thesis's.
+//! `flyby bench`: tables beside the thesis's, beside other programs, beside itself.
 
 use serde_json::Value;
 
@@ -40,4 +40,58 @@ fn settings_out_of_range_are_refused_with_the_range() {
     assert!(said.contains("between 1e-9 and 0.1"), "{said}");
     let (_, said) = place.ends(2, &["bench", "thesis", "--side", "1"]);
     assert!(said.contains("2..=800"), "{said}");
+}
+
+#[test]
+fn rows_beside_ourselves_have_ratios_and_those_without_a_peer_are_left_out_by_name() {
+    let place = Place::new();
+    let args = ["bench", "peers", "--runs", "1", "--side", "16"];
+    let rows = [
+        "tracer-gradient",
+        "reduced-affine",
+        "gradient-1",
+        "noise-fastnoise2",
+    ];
+    let json = ["--output", "json"];
+    let (out, _) = place.ends(0, &[&args[..], &rows[..], &json[..]].concat());
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let measured = report["rows"].as_array().unwrap();
+    let names: Vec<&str> = measured
+        .iter()
+        .map(|row| row["row"].as_str().unwrap())
+        .collect();
+    // In the order of the table, not of the command line.
+    assert_eq!(names, ["gradient-1", "tracer-gradient", "reduced-affine"]);
+    for row in measured {
+        let number = |value: &Value| value.as_f64().unwrap();
+        let (ratio, budget) = (number(&row["ratio"]), number(&row["budget"]));
+        let (ours, theirs) = (&row["ours"]["median"], &row["theirs"]["median"]);
+        assert!((ratio - number(ours) / number(theirs)).abs() < 1e-9 * ratio);
+        assert_eq!(row["wanted"], "at_most");
+        assert_eq!(row["reached"], ratio <= budget);
+    }
+    assert_eq!(report["skipped"][0]["row"], "noise-fastnoise2");
+    let (_, said) = place.ends(2, &["bench", "peers", "--only", "nothing"]);
+    assert!(said.contains("sphere-3-proven"), "{said}");
+}
+
+#[test]
+fn threads_are_measured_beside_processes() {
+    let place = Place::new();
+    place.write("ball.toml", crate::scene::SPHERE);
+    let args = ["bench", "threads", "ball.toml", "--runs", "1"];
+    let (out, _) = place.ends(0, &[&args[..], &["--output", "json"]].concat());
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let ball = &report["scenes"][0];
+    assert_eq!(
+        (ball["scene"].as_str(), report["threads"].as_u64()),
+        (Some("ball"), Some(2))
+    );
+    assert!(ball["ratio"][0].as_f64().unwrap() > 0.0);
+    assert!(ball["reached"].is_null(), "too short to be judged: {ball}");
+    let (_, said) = place.ends(2, &["bench", "threads", "ball.toml", "--threads", "1"]);
+    assert!(said.contains("2..=256"), "{said}");
+    place.write("wrong.toml", "name = 3");
+    let (_, said) = place.ends(1, &["bench", "threads", "wrong.toml", "--runs", "1"]);
+    assert!(said.contains("wrong.toml"), "{said}");
 }

@@ -76,6 +76,8 @@ fn a_frame_says_what_it_shows() {
     let statistics: Value =
         serde_json::from_str(info["metadata"]["flyby:statistics"].as_str().unwrap()).unwrap();
     assert_eq!(statistics["pixels"], 40 * 30);
+    let names = statistics.as_object().unwrap().values();
+    assert!(names.into_iter().all(Value::is_u64), "counts alone");
     let (table, _) = place.ends(0, &["image", "info", "a/ball_0001.exr"]);
     assert!(
         table.contains("N.X") && table.contains("flyby:sceneDigest"),

@@ -41,6 +41,29 @@ fn frames_lie_in_a_folder_of_the_scene_s_name() {
 }
 
 #[test]
+fn statistics_say_counts_averages_and_times() {
+    let place = ball();
+    let command = ["render", "ball.toml", "--frames", "0", "--stats"];
+    let (out, _) = place.ends(0, &[&command[..], &["--output", "json"]].concat());
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let statistics = &report["statistics"];
+    let number = |value: &Value| value.as_f64().unwrap();
+    let rays = number(&statistics["rays"]) + number(&statistics["shadow_rays"]);
+    for name in ["evaluations", "steps", "backtracks", "subdivisions"] {
+        let average = number(&statistics["per_ray"][name]);
+        assert!(
+            (average * rays - number(&statistics[name])).abs() < 0.5,
+            "{name}"
+        );
+    }
+    for part in ["preparation", "bundles", "search", "sky", "encoding"] {
+        assert!(number(&statistics["seconds"][part]) > 0.0, "{part}");
+    }
+    let (out, _) = place.ends(0, &[&command[..], &["--existing", "replace"]].concat());
+    assert!(out.contains("per ray: ") && out.contains("part"), "{out}");
+}
+
+#[test]
 fn a_second_run_keeps_replaces_or_stops() {
     let place = ball();
     let run = |code, more: &[&str]| {

@@ -1,5 +1,6 @@
 //! Runs POV-Ray on a scene and reads its times.
 
+use std::fs;
 use std::io;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -20,8 +21,12 @@ pub(crate) fn is_there() -> bool {
         .is_ok()
 }
 
-/// Renders a scene file on one thread; gives the CPU time of tracing alone, in seconds.
-pub(crate) fn trace(scene: &Path, folder: &Path, declarations: &[&str]) -> Result<f64, Error> {
+/// Renders a scene on one thread; gives the CPU time of tracing alone, in seconds.
+pub(crate) fn trace(scene: &str, folder: &Path, declarations: &[&str]) -> Result<f64, Error> {
+    let file = folder.join("peer.pov");
+    fs::write(&file, scene).map_err(|error| {
+        Error::failed(format!("cannot write `{}`", file.display())).because(error)
+    })?;
     let mut picture = std::ffi::OsString::from("+O");
     picture.push(folder.join("povray.png"));
     let output = Command::new("povray")
@@ -29,7 +34,7 @@ pub(crate) fn trace(scene: &Path, folder: &Path, declarations: &[&str]) -> Resul
         .args([format!("+W{SIDE}"), format!("+H{SIDE}")])
         .arg(picture)
         .args(declarations.iter().map(|text| format!("Declare={text}")))
-        .arg(scene)
+        .arg(file)
         .stdin(Stdio::null())
         .output()
         .map_err(|error: io::Error| Error::failed("cannot run povray").because(error))?;

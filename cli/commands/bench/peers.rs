@@ -1,18 +1,16 @@
 //! `flyby bench peers`: this renderer beside other programs on the same surfaces.
 
-use std::fs;
-use std::path::Path;
-
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use render::SimdLevel;
 
+use crate::bench::peers::limit::Limit;
+use crate::bench::peers::pairs::{Pair, Place};
+use crate::bench::peers::povray;
 use crate::bench::peers::report::{Compared, Peers, Skipped, Times};
-use crate::bench::peers::rows::{Peer, ROWS, Row};
-use crate::bench::peers::{ours, povray};
+use crate::bench::peers::rows::{ROWS, Row, SPHERE, TERRAIN, TERRAIN_SHADOWS};
 use crate::error::{Ending, Error};
-use crate::load::Scene;
-use crate::options::{Context, SceneOptions};
+use crate::options::Context;
 use crate::output;
 use crate::progress::Progress;
 use crate::stop::Stop;
@@ -23,14 +21,20 @@ pub(crate) struct Options {
     #[arg(value_name = "ROW", value_parser = rows())]
     rows: Vec<String>,
 
+    /// Measure the rows whose names begin so, besides those named.
+    #[arg(long, value_name = "PREFIX")]
+    only: Vec<String>,
+
     /// Turns of both sides; the median counts.
     #[arg(long, value_name = "N", default_value_t = 3,
           value_parser = clap::value_parser!(u32).range(1..=1_000))]
     runs: u32,
-}
 
-/// Renders the peer's side once and tells the seconds.
-type Turn<'a> = Box<dyn Fn() -> Result<f64, Error> + 'a>;
+    /// Rays along a side where single methods are timed; four times as many where the renderer is timed beside one.
+    #[arg(long, value_name = "N", default_value_t = 32,
+          value_parser = clap::value_parser!(u32).range(8..=800))]
+    side: u32,
+}
 
 fn rows() -> PossibleValuesParser {
     ROWS.iter()
@@ -39,145 +43,136 @@ fn rows() -> PossibleValuesParser {
         .into()
 }
 
+impl Options {
+    fn chosen(&self) -> Vec<&'static Row> {
+        let all = self.rows.is_empty() && self.only.is_empty();
+        let named = |row: &Row| self.rows.iter().any(|name| name == row.name);
+        let begun = |row: &Row| self.only.iter().any(|prefix| row.name.starts_with(prefix));
+        ROWS.iter()
+            .filter(|row| all || named(row) || begun(row))
+            .collect()
+    }
+}
+
 /// Runs the command.
 pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error> {
+    let chosen = options.chosen();
+    if chosen.is_empty() {
+        let names: Vec<_> = ROWS.iter().map(|row| row.name).collect();
+        return Err(Error::usage("no row's name begins so")
+            .next(format!("the rows are {}", names.join(", "))));
+    }
     let folder = tempfile::tempdir()
         .map_err(|error| Error::failed("cannot make a folder for the scenes").because(error))?;
+    let place = Place {
+        folder: folder.path(),
+        has_povray: povray::is_there(),
+        side: options.side,
+    };
     let stop = Stop::on_signals()?;
-    let chosen: Vec<&Row> = ROWS
-        .iter()
-        .filter(|row| options.rows.is_empty() || options.rows.iter().any(|name| name == row.name))
-        .collect();
-    let total = chosen.len() as u64 * u64::from(options.runs);
-    let mut progress = Progress::new(context.output, total, 0);
+    let mut progress = Progress::new(context.output, chosen.len() as u64, 0);
     let mut peers = Peers {
         runs: options.runs,
         simd: SimdLevel::best().to_string(),
         rows: Vec::new(),
         skipped: Vec::new(),
+        limits: Vec::new(),
     };
-    let has_povray = povray::is_there();
-    for (number, row) in chosen.into_iter().enumerate() {
-        let mut skip = |why: String| {
-            peers.skipped.push(Skipped { row: row.name, why });
-        };
-        let scene = match scene(row, folder.path()) {
-            Ok(scene) => scene,
-            Err(error) => {
-                skip(error.to_string());
-                continue;
+    for (number, row) in (0..).zip(&chosen) {
+        progress.update(number, row.name);
+        match place.pairs(row) {
+            Err(why) => peers.skipped.push(Skipped { row: row.name, why }),
+            Ok(pairs) => {
+                for mut pair in pairs {
+                    peers.rows.extend(compared(&mut pair, options.runs, &stop)?);
+                }
             }
-        };
-        let peer: (&str, Turn<'_>) = match row.peer {
-            Peer::Absent(program) => {
-                skip(format!("needs {program}, which is not here"));
-                continue;
-            }
-            Peer::PovRay(_) if !has_povray => {
-                skip("povray is not installed (apt-get install povray povray-includes)".into());
-                continue;
-            }
-            Peer::PovRay(declarations) => {
-                let file = folder.path().join("peer.pov");
-                write(&file, row.scene.povray)?;
-                let folder = folder.path();
-                (
-                    "POV-Ray",
-                    Box::new(move || povray::trace(&file, folder, declarations)),
-                )
-            }
-            Peer::OneRay { .. } => {
-                let single = load(row, folder.path(), 1)?;
-                ("one ray per pixel", Box::new(move || ours::render(&single)))
-            }
-        };
-        let (mut mine, mut theirs) = (Vec::new(), Vec::new());
-        for turn in 0..options.runs {
-            if stop.is_set() {
-                return Err(Error::interrupted("the measurement was stopped"));
-            }
-            progress.update(
-                number as u64 * u64::from(options.runs) + u64::from(turn),
-                row.name,
-            );
-            mine.push(ours::render(&scene)?);
-            theirs.push(peer.1()?);
         }
-        peers.rows.extend(compared(row, peer.0, mine, theirs));
+    }
+    // What bounds us is worth its time only where all of the table is wanted.
+    if chosen.len() == ROWS.len() {
+        for (name, scene) in [
+            ("sphere-3", SPHERE),
+            ("terrain", TERRAIN),
+            ("terrain-shadows", TERRAIN_SHADOWS),
+        ] {
+            peers.limits.push(Limit::of(name, scene, folder.path())?);
+        }
     }
     progress.finish();
     output::print(context.output, &peers)?;
     Ok(Ending::Done)
 }
 
-fn compared(row: &'static Row, peer: &str, mine: Vec<f64>, theirs: Vec<f64>) -> Option<Compared> {
-    let (ours, theirs) = (Times::of(mine)?, Times::of(theirs)?);
-    let theirs = match row.peer {
-        Peer::OneRay { rays } => theirs.times(f64::from(rays * rays)),
-        Peer::PovRay(_) | Peer::Absent(_) => theirs,
-    };
-    let ratio = theirs.median / ours.median;
-    Some(Compared {
-        row: row.name,
-        ours,
-        peer: peer.to_owned(),
-        theirs,
-        ratio,
-        budget: row.budget,
-        reached: ratio >= row.budget,
-    })
-}
-
-/// Our side's scene.
-fn scene(row: &Row, folder: &Path) -> Result<Scene, Error> {
-    load(
-        row,
-        folder,
-        match row.peer {
-            Peer::OneRay { rays } => rays,
-            Peer::PovRay(_) | Peer::Absent(_) => 1,
-        },
-    )
-}
-
-fn load(row: &Row, folder: &Path, rays: u32) -> Result<Scene, Error> {
-    let file = folder.join("ours.toml");
-    write(&file, row.scene.ours)?;
-    SceneOptions {
-        scene: file,
-        resolution: None,
-        rays: Some(rays),
-        crop: None,
-        set: row.set.iter().map(|&set| set.to_owned()).collect(),
+/// Both sides, in turns.
+fn compared(pair: &mut Pair<'_>, runs: u32, stop: &Stop) -> Result<Option<Compared>, Error> {
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    for _ in 0..runs {
+        if stop.is_set() {
+            return Err(Error::interrupted("the measurement was stopped"));
+        }
+        ours.push((pair.ours.turn)()?);
+        theirs.push((pair.theirs.turn)()?);
     }
-    .load()
-}
-
-fn write(path: &Path, text: &str) -> Result<(), Error> {
-    fs::write(path, text)
-        .map_err(|error| Error::failed(format!("cannot write `{}`", path.display())).because(error))
+    let times = Times::of(ours).zip(Times::of(theirs));
+    Ok(times.map(|(ours, theirs)| Compared::new(pair, ours, theirs)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bench::peers::pairs::Side;
+    use crate::bench::peers::rows::{Budget, What};
 
     #[test]
-    fn every_row_that_can_run_has_a_scene_of_its_own() {
+    fn every_row_without_a_peer_of_its_own_is_made_ready() {
         let folder = tempfile::tempdir().unwrap();
+        let place = Place {
+            folder: folder.path(),
+            has_povray: true,
+            side: 8,
+        };
         for row in ROWS {
-            // Blobs may be missing from a build; nothing else may.
-            if !row.name.starts_with("blob") {
-                let scene = scene(row, folder.path()).unwrap();
-                assert_eq!(scene.description().film.images, 1);
+            let ready = match row.what {
+                What::Fidget { .. } | What::Noise { .. } => cfg!(feature = "peers"),
+                What::Absent { .. } => false,
+                _ => true,
+            };
+            if matches!(row.what, What::Absent { ours: Some(_), .. }) {
+                // Renders for its rate; tests/cli does that.
+                continue;
+            }
+            match place.pairs(row) {
+                Ok(pairs) => assert!(ready && !pairs.is_empty(), "{}", row.name),
+                Err(why) => assert!(!ready && !why.is_empty(), "{}: {why}", row.name),
             }
         }
     }
 
     #[test]
-    fn many_rays_are_compared_with_as_many_single_ones() {
-        let row = ROWS.iter().find(|row| row.name == "many-rays").unwrap();
-        let compared = compared(row, "one ray", vec![2.0], vec![0.1]).unwrap();
-        assert_eq!((compared.ratio, compared.reached), (5.0, true));
+    fn sides_take_turns() {
+        let order = std::cell::RefCell::new(Vec::new());
+        let side = |name: &'static str, seconds: f64| Side {
+            called: name.to_owned(),
+            turn: Box::new({
+                let order = &order;
+                move || {
+                    order.borrow_mut().push(name);
+                    Ok(seconds)
+                }
+            }),
+            amount: None,
+        };
+        let mut pair = Pair {
+            name: "row".to_owned(),
+            ours: side("a", 2.0),
+            theirs: side("b", 3.0),
+            budget: Budget::Open,
+        };
+        let stop = Stop::on_signals().unwrap();
+        let result = compared(&mut pair, 2, &stop).unwrap().unwrap();
+        assert_eq!(result.ratio, 1.5);
+        drop(pair);
+        assert_eq!(order.into_inner(), ["a", "b", "a", "b"]);
     }
 }

@@ -20,6 +20,7 @@ mod renderer;
 mod sample;
 mod shade;
 mod sky;
+mod times;
 mod trace;
 mod view;
 
@@ -33,6 +34,7 @@ pub use field::SimdLevel;
 pub use renderer::{EvalSettings, ImageRenderer};
 pub use sample::spline::FILTER_ORDER_MAX;
 pub use sample::strata::RAYS_MAX;
+pub use times::{Clock, Part, Times};
 pub use trace::methods;
 
 /// The renderer's revision: raised whenever a pixel of any scene changes.

@@ -20,6 +20,7 @@ use crate::sample::{Sample, Strata};
 use crate::shade::light::Lit;
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
+use crate::times::{Clock, Part, Stopwatch, Times};
 use crate::trace::{Goal, Hit, Ray, Surface, Tracer};
 use crate::view::{Sight, View};
 
@@ -122,7 +123,31 @@ impl ImageRenderer {
         cancel: &AtomicBool,
         pixels: &mut Vec<f32>,
     ) -> Result<Counts, Cancelled> {
+        let rendered = self.render(block, cancel, pixels, None);
+        rendered.map(|(counts, _)| counts)
+    }
+
+    /// The same, and how long the parts took by `clock`, which is read a few times for every few
+    /// thousand samples.
+    pub fn render_block_timed(
+        &self,
+        block: Rect,
+        cancel: &AtomicBool,
+        pixels: &mut Vec<f32>,
+        clock: Clock,
+    ) -> Result<(Counts, Times), Cancelled> {
+        self.render(block, cancel, pixels, Some(clock))
+    }
+
+    fn render(
+        &self,
+        block: Rect,
+        cancel: &AtomicBool,
+        pixels: &mut Vec<f32>,
+        clock: Option<Clock>,
+    ) -> Result<(Counts, Times), Cancelled> {
         let mut work = Work::default();
+        work.tracer.stopwatch = Stopwatch::new(clock);
         let mut counts = Counts::default();
         let mut film = Film::new(block, pixels);
         let per_pixel = self.strata.per_pixel();
@@ -130,6 +155,7 @@ impl ImageRenderer {
             .flat_map(|y| (block.x0..block.x1).map(move |x| (x, y)))
             .collect();
         for places in places.chunks((TOGETHER / per_pixel).max(1)) {
+            work.tracer.stopwatch.begin(Part::Sampling);
             work.clear();
             for &(x, y) in places {
                 self.strata.of_pixel(x, y, &mut work.samples);
@@ -137,13 +163,15 @@ impl ImageRenderer {
             let corner = [block.x0, block.y0];
             arrange(&mut work.samples, corner, self.slices, &mut work.from);
             self.see(&mut work, cancel, &mut counts)?;
+            work.tracer.stopwatch.begin(Part::Film);
             work.put_back();
             for seen in work.in_order.chunks_exact(per_pixel) {
                 film.push(seen, &mut counts);
             }
         }
         counts.noise_evaluations += work.tracer.scratch.noise_evaluations;
-        Ok(counts)
+        work.tracer.stopwatch.stop();
+        Ok((counts, work.tracer.stopwatch.times))
     }
 
     /// Follows all samples of `work` into the scene.
@@ -174,8 +202,11 @@ impl ImageRenderer {
             counts,
             &mut work.hits,
         )?;
+        work.tracer.stopwatch.begin(Part::Normals);
         self.touch(work, counts);
+        work.tracer.stopwatch.begin(Part::Shadows);
         self.cast_shadows(work, cancel, counts)?;
+        work.tracer.stopwatch.begin(Part::Shading);
         self.shade(work);
         Ok(())
     }
@@ -314,6 +345,7 @@ impl ImageRenderer {
             },
         );
         self.shade_surface(work);
+        work.tracer.stopwatch.begin(Part::Sky);
         self.shade_sky(work);
     }
 

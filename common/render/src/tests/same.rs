@@ -1,6 +1,6 @@
 //! A pixel depends on scene, image and place alone.
 
-use core::sync::atomic::AtomicBool;
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use model::{ImageNumber, Rect};
 
@@ -101,6 +101,27 @@ fn images_differ_and_nothing_is_lost_on_the_way() {
     )
     .unwrap();
     assert!(block(&other, scene.film.resolution.rect()).0 != pixels);
+}
+
+#[test]
+fn a_clock_changes_neither_pixels_nor_counts() {
+    /// A clock on which every reading is later than the last.
+    fn clock() -> u64 {
+        static NOW: AtomicU64 = AtomicU64::new(0);
+        NOW.fetch_add(1, Ordering::Relaxed)
+    }
+    let scene = scenes::planet();
+    let renderer = renderer(&scene, EvalSettings::default());
+    let whole = scene.film.resolution.rect();
+    let (reference, counts) = block(&renderer, whole);
+    let mut pixels = Vec::new();
+    let (counted, times) = renderer
+        .render_block_timed(whole, &AtomicBool::new(false), &mut pixels, clock)
+        .unwrap();
+    assert!(pixels == reference && counted == counts);
+    for (part, time) in times.parts() {
+        assert!(time > 0, "{} took no time", part.name());
+    }
 }
 
 #[test]

@@ -186,6 +186,7 @@ impl Bundles {
             if ahead > split * radius && at.t[i] <= lane.end && lane.steps < STEPS_MAX {
                 continue;
             }
+            counts.subdivisions += u64::from(at.t[i] <= lane.end);
             for span in &mut spans[lane.first..lane.first + lane.count] {
                 if at.t[i] > span.clear {
                     span.clear = at.t[i];

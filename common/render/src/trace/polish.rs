@@ -48,12 +48,10 @@ struct Lane {
 }
 
 impl Polish {
-    /// Takes a ray, and polishes if there are many.
-    pub(crate) fn push(&mut self, found: Found, wanted: Wanted<'_>, results: Results<'_>) {
+    /// Takes a ray; says whether so many wait that they should be polished now.
+    pub(crate) fn push(&mut self, found: Found) -> bool {
         self.found.push(found);
-        if self.found.len() >= 2 * BATCH {
-            self.run(wanted, results);
-        }
+        self.found.len() >= 2 * BATCH
     }
 
     /// Polishes all that wait.

@@ -13,6 +13,7 @@ use super::search::Search;
 use super::surface::Surface;
 use crate::counts::Counts;
 use crate::error::Cancelled;
+use crate::times::{Part, Stopwatch};
 
 /// Rays that are traced together: between them it is looked whether to go on.
 const TOGETHER: usize = 4096;
@@ -89,6 +90,8 @@ pub(crate) struct Tracer {
     polish: Polish,
     /// Memory of evaluations; also counts noises.
     pub(crate) scratch: Scratch,
+    /// Told which part of the work begins.
+    pub(crate) stopwatch: Stopwatch,
 }
 
 impl Tracer {
@@ -128,14 +131,26 @@ impl Tracer {
         counts: &mut Counts,
         hits: &mut [Hit],
     ) -> Result<(), Cancelled> {
-        let Wanted { surface, rays, .. } = wanted;
+        let Wanted {
+            surface,
+            goal,
+            rays,
+            ..
+        } = wanted;
+        // Of rays towards the sun all parts are one.
+        let part = |part: Part| match goal {
+            Goal::Distance => part,
+            Goal::Occlusion => Part::Shadows,
+        };
         let Self {
             spans,
             bundles,
             search,
             polish,
             scratch,
+            stopwatch,
         } = self;
+        stopwatch.begin(part(Part::Bundles));
         spans.clear();
         spans.extend(rays.iter().enumerate().filter_map(|(index, ray)| {
             let (clear, end) = bound::clip(&surface.bound, ray.origin, ray.direction)?;
@@ -151,9 +166,15 @@ impl Tracer {
             counts,
             hits,
         };
+        stopwatch.begin(part(Part::Search));
         search.run(wanted, spans, results, |found, results| {
-            polish.push(found, wanted, results);
+            if polish.push(found) {
+                stopwatch.begin(part(Part::Polish));
+                polish.run(wanted, results);
+                stopwatch.begin(part(Part::Search));
+            }
         })?;
+        stopwatch.begin(part(Part::Polish));
         let results = Results {
             scratch,
             counts,
