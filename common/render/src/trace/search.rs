@@ -19,6 +19,7 @@ use super::clearance::{CAUTION, FLAT, Known};
 use super::grid::Steps;
 use super::polish::Found;
 use super::surface::Surface;
+use super::techniques::Technique;
 use super::tracer::{Goal, Hit, Ray, Results, Wanted};
 use crate::error::Cancelled;
 
@@ -265,9 +266,10 @@ impl Search {
             }
         }
         let known = surface.clearances.known;
+        let is_foreseen = Technique::Foresight.is_used(surface.without);
         surface.level.vectorize(
             #[inline(always)]
-            || rows.advance(rays, known, paths, batch),
+            || rows.advance(rays, known, paths, batch, is_foreseen),
         );
     }
 }
@@ -283,19 +285,35 @@ impl Rows {
     }
 
     #[inline(always)]
-    fn advance(&mut self, rays: &[Lane], known: Known, paths: &Paths, batch: &Batch) {
+    fn advance(
+        &mut self,
+        rays: &[Lane],
+        known: Known,
+        paths: &Paths,
+        batch: &Batch,
+        is_foreseen: bool,
+    ) {
         assert!(rays.len() <= BATCH);
         for (i, lane) in rays.iter().enumerate() {
             let part = |axis: usize| (batch.place[axis][i], paths.direction[axis][i]);
             let growth = known.growth_at([part(0), part(1), part(2)]);
-            self.advance_one(i, lane.steps, growth, batch.value[i], batch.slope[i]);
+            let (value, slope) = (batch.value[i], batch.slope[i]);
+            self.advance_one(i, lane.steps, growth, value, slope, is_foreseen);
         }
     }
 
     /// What the value at a lane's point proves, and where to look next. Lanes are at different
     /// points of their searches, so that branches would be mispredicted: all of it is computed for each.
     #[inline(always)]
-    fn advance_one(&mut self, i: usize, steps: Steps, growth: f64, value: f64, slope: f64) {
+    fn advance_one(
+        &mut self,
+        i: usize,
+        steps: Steps,
+        growth: f64,
+        value: f64,
+        slope: f64,
+        is_foreseen: bool,
+    ) {
         let (at, clear) = (self.at[i], self.clear[i]);
         let is_outside = (value > 0.0) | (self.cut[i] > 0.0);
         // A value that is not finite proves nothing about its surroundings.
@@ -327,9 +345,13 @@ impl Rows {
         let meet = FORESIGHT * (ahead + behind) / rate;
         let root = proof / -slope;
         // Nothing proven, nothing foreseen: then it may not be a number.
-        let meet = if meet > ahead { meet } else { ahead };
+        let meet = if is_foreseen & (meet > ahead) {
+            meet
+        } else {
+            ahead
+        };
         // The last point within reach: one beyond would not be covered. Past the root it need not be.
-        let target = if (slope < 0.0) & (ahead > NEARLY * root) {
+        let target = if is_foreseen & (slope < 0.0) & (ahead > NEARLY * root) {
             steps.from(at + root)
         } else {
             steps.before(steps.from(at + meet))

@@ -8,6 +8,7 @@ use scene::description::{Bound, Seed};
 use super::clearance::{Around, Clearances};
 use super::grid::Grid;
 use super::split::split;
+use super::techniques::Technique;
 use crate::error::RenderError;
 use crate::view::{Footprint, View};
 
@@ -41,14 +42,27 @@ pub(crate) struct Surface {
     pub(crate) moves: bool,
     /// Whether derivatives along rays are worth what they cost.
     pub(crate) tangents: bool,
+    /// A technique that is left out.
+    pub(crate) without: Option<Technique>,
 }
 
 impl Surface {
     /// Compiles the surface for the instants, distances and footprints of one view.
+    #[cfg(test)]
     pub(crate) fn new(
         description: &Description,
         view: &View,
         level: SimdLevel,
+    ) -> Result<Self, RenderError> {
+        Self::without(description, view, level, None)
+    }
+
+    /// The same, with a technique left out.
+    pub(crate) fn without(
+        description: &Description,
+        view: &View,
+        level: SimdLevel,
+        without: Option<Technique>,
     ) -> Result<Self, RenderError> {
         let surface = &description.surface;
         let (start, end) = view.instants();
@@ -61,8 +75,10 @@ impl Surface {
         };
         let program = compile(&surface.graph, surface.field)?;
         let rest = match split(&surface.graph, surface.field, &surface.seed) {
-            Some(split) => Some(compile(&split.graph, split.rest)?),
-            None => None,
+            Some(split) if Technique::Growth.is_used(without) => {
+                Some(compile(&split.graph, split.rest)?)
+            }
+            _ => None,
         };
         let footprint = view.footprint();
         let around = Around {
@@ -74,6 +90,7 @@ impl Surface {
             time,
             eye: view.eye(),
             travel: view.travel(),
+            without,
         };
         let clearances = Clearances::new(&around, nearest(&program, level, view));
         let sight = if footprint.angle > 0.0 {
@@ -84,7 +101,9 @@ impl Surface {
         };
         Ok(Self {
             moves: program.moves(),
-            tangents: clearances.gain_by_tangents(footprint),
+            tangents: Technique::Tangents.is_used(without)
+                && clearances.gain_by_tangents(footprint),
+            without,
             program,
             level,
             clearances,
