@@ -55,7 +55,9 @@ impl Ending {
             Self::Failed => "the work failed: a file, a frame or a disk",
             Self::Usage => "a wrong option or configuration, or a scene with mistakes",
             Self::Unreachable => "no coordinator answered, or it refused",
-            Self::Different => "`image compare`: the frames differ",
+            Self::Different => {
+                "`image compare`: the frames differ; `bench techniques`: a pixel does"
+            }
             Self::JobLost => "the job failed or was cancelled",
             Self::Interrupted => "ended by Ctrl-C or SIGTERM before the work was done",
         }

@@ -1,9 +1,11 @@
 //! What `flyby bench` measures: [`thesis`] fixes what is cast at what, [`cast`] counts, [`report`] prints;
-//! [`peers`] compares this renderer with other programs, [`threads`] threads with processes.
+//! [`peers`] compares this renderer with other programs, [`threads`] threads with processes, [`techniques`] the
+//! tracer with itself.
 
 pub(crate) mod cast;
 pub(crate) mod peers;
 pub(crate) mod report;
+pub(crate) mod techniques;
 pub(crate) mod thesis;
 pub(crate) mod threads;
 

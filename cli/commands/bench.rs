@@ -1,6 +1,7 @@
 //! `flyby bench`: measurements beside those of the reference documents.
 
 mod peers;
+mod techniques;
 mod threads;
 
 use clap::{Args, Subcommand};
@@ -20,6 +21,8 @@ pub(crate) enum BenchCommand {
     Thesis(Options),
     /// Times of one thread beside other programs' on the same surfaces, in turns.
     Peers(peers::Options),
+    /// The tracer without each of its techniques in turn: equal pixels by more work.
+    Techniques(techniques::Options),
     /// Threads of one process beside as many processes of one thread at the same time.
     Threads(threads::Options),
 }
@@ -52,6 +55,7 @@ pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Er
             Ok(Ending::Done)
         }
         BenchCommand::Peers(options) => peers::run(context, &options),
+        BenchCommand::Techniques(options) => techniques::run(context, &options),
         BenchCommand::Threads(options) => threads::run(context, &options),
     }
 }

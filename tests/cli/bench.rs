@@ -95,3 +95,23 @@ fn threads_are_measured_beside_processes() {
     let (_, said) = place.ends(1, &["bench", "threads", "wrong.toml", "--runs", "1"]);
     assert!(said.contains("wrong.toml"), "{said}");
 }
+
+#[test]
+fn techniques_of_the_tracer_gain_work_and_change_no_pixel() {
+    let place = Place::new();
+    let args = ["bench", "techniques", "sphere-3", "flight", "--side", "64"];
+    let (out, _) = place.ends(
+        0,
+        &[&args[..], &["--rays", "2", "--output", "json"]].concat(),
+    );
+    let report: Value = serde_json::from_str(&out).unwrap();
+    for (number, gains) in [(0, "tangents"), (1, "levels by value")] {
+        let without = report["scenes"][number]["without"].as_array().unwrap();
+        assert!(without.len() >= 8 && without.iter().all(|one| one["is_equal"] == true));
+        let one = without
+            .iter()
+            .find(|one| one["technique"] == gains)
+            .unwrap();
+        assert!(one["evaluations"].as_f64().unwrap() > 1.2, "{one}");
+    }
+}

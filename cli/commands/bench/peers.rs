@@ -133,11 +133,9 @@ mod tests {
             side: 8,
         };
         for row in ROWS {
-            let ready = match row.what {
-                What::Fidget { .. } | What::Noise { .. } => cfg!(feature = "peers"),
-                What::Absent { .. } => false,
-                _ => true,
-            };
+            let is_crate = matches!(row.what, What::Fidget { .. } | What::Noise { .. });
+            let is_absent = matches!(row.what, What::Absent { .. });
+            let ready = !is_absent && (cfg!(feature = "peers") || !is_crate);
             if matches!(row.what, What::Absent { ours: Some(_), .. }) {
                 // Renders for its rate; tests/cli does that.
                 continue;

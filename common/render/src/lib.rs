@@ -35,7 +35,7 @@ pub use renderer::{EvalSettings, ImageRenderer};
 pub use sample::spline::FILTER_ORDER_MAX;
 pub use sample::strata::RAYS_MAX;
 pub use times::{Clock, Part, Times};
-pub use trace::methods;
+pub use trace::{Technique, methods};
 
 /// The renderer's revision: raised whenever a pixel of any scene changes.
 ///

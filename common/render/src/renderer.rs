@@ -21,7 +21,7 @@ use crate::shade::light::Lit;
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
 use crate::times::{Clock, Part, Stopwatch, Times};
-use crate::trace::{Goal, Hit, Ray, Surface, Tracer};
+use crate::trace::{Goal, Hit, Ray, Surface, Technique, Tracer};
 use crate::view::{Sight, View};
 
 /// Samples that are worked on together, about: enough to fill batches, few enough for the cache.
@@ -67,6 +67,17 @@ impl ImageRenderer {
         image: ImageNumber,
         settings: EvalSettings,
     ) -> Result<Self, RenderError> {
+        Self::without(None, description, assets, image, settings)
+    }
+
+    /// The same, but a technique of the tracer is left out: the same pixels by more work, for measuring what it gains.
+    pub fn without(
+        technique: Option<Technique>,
+        description: &Description,
+        assets: &Assets,
+        image: ImageNumber,
+        settings: EvalSettings,
+    ) -> Result<Self, RenderError> {
         let film = &description.film;
         let sampling = &description.sampling;
         if image.0 >= film.images {
@@ -90,14 +101,16 @@ impl ImageRenderer {
         let start = f64::from(image.0) / film.fps;
         let view = View::new(&description.camera, film, start);
         let (start, end) = view.instants();
-        let surface = Surface::new(description, &view, settings.level)?;
+        let surface = Surface::without(description, &view, settings.level, technique)?;
         let palette = Palette::new(description, assets, Interval::new(start, end))?;
         let up = surface.vertical(view.eye());
         let ground = mean_albedo(&description.surface.material);
         Ok(Self {
             strata: Strata::new(rays, order, description.key, image.0),
             // Where nothing moves, all instants are one.
-            slices: if view.travel() > 0.0 || surface.moves {
+            slices: if Technique::Slices.is_used(technique)
+                && (view.travel() > 0.0 || surface.moves)
+            {
                 rays
             } else {
                 1
@@ -161,7 +174,12 @@ impl ImageRenderer {
                 self.strata.of_pixel(x, y, &mut work.samples);
             }
             let corner = [block.x0, block.y0];
-            arrange(&mut work.samples, corner, self.slices, &mut work.from);
+            if Technique::Curve.is_used(self.surface.without) {
+                arrange(&mut work.samples, corner, self.slices, &mut work.from);
+            } else {
+                work.from.clear();
+                work.from.extend((0..).take(work.samples.len()));
+            }
             self.see(&mut work, cancel, &mut counts)?;
             work.tracer.stopwatch.begin(Part::Film);
             work.put_back();

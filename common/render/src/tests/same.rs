@@ -5,7 +5,7 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use model::{ImageNumber, Rect};
 
 use super::scenes::{self, block, image, renderer};
-use crate::{Assets, Cancelled, EvalSettings, ImageRenderer, RenderError, SimdLevel};
+use crate::{Assets, Cancelled, EvalSettings, ImageRenderer, RenderError, SimdLevel, Technique};
 
 #[test]
 fn every_level_gives_the_same_bytes_and_counts() {
@@ -121,6 +121,40 @@ fn a_clock_changes_neither_pixels_nor_counts() {
     assert!(pixels == reference && counted == counts);
     for (part, time) in times.parts() {
         assert!(time > 0, "{} took no time", part.name());
+    }
+}
+
+#[test]
+fn no_technique_of_the_tracer_changes_a_pixel() {
+    for technique in Technique::ALL {
+        let mut is_of_use = false;
+        for (name, scene) in scenes::all() {
+            let settings = EvalSettings::default();
+            let (reference, counts) = image(&scene, settings);
+            let without = ImageRenderer::without(
+                Some(technique),
+                &scene,
+                &Assets::new(),
+                ImageNumber(1),
+                settings,
+            )
+            .unwrap();
+            let (pixels, more) = block(&without, scene.film.resolution.rect());
+            let equal = pixels
+                .iter()
+                .zip(&reference)
+                .all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(equal, "{name} differs without {}", technique.name());
+            assert_eq!(results(more), results(counts), "{name}");
+            is_of_use |= more.evaluations > counts.evaluations;
+        }
+        // Of no scene here: their shutters are as short as their images are small.
+        let is_left_out = technique == Technique::Slices;
+        assert!(
+            is_of_use || is_left_out,
+            "{} gains nothing",
+            technique.name()
+        );
     }
 }
 

@@ -6,6 +6,7 @@ use scene::description::{Bound, Seed};
 
 use super::batch::Lanes;
 use super::grid::FAR;
+use super::techniques::Technique;
 use crate::view::Footprint;
 
 /// Distances are shortened by this share, for the rounding of their own few operations.
@@ -193,6 +194,8 @@ pub(crate) struct Around<'a> {
     pub(crate) eye: DVec3,
     /// How far the eye moves while the shutter is open.
     pub(crate) travel: f64,
+    /// A technique that is left out.
+    pub(crate) without: Option<Technique>,
 }
 
 impl Clearances {
@@ -204,7 +207,7 @@ impl Clearances {
         };
         let mut tables = vec![around.table(0.0, FAR, f64::INFINITY)];
         let first = exponent(nearest);
-        if around.footprint.angle > 0.0 {
+        if around.footprint.angle > 0.0 && Technique::Distances.is_used(around.without) {
             for exponent in first..exponent(FAR) {
                 let distance = power(exponent);
                 tables.push(around.table(distance / 2.0, distance * 4.0, distance / 2.0));
@@ -235,11 +238,18 @@ impl Around<'_> {
             time: self.time,
             footprint_slope: self.footprint.angle,
         };
-        let whole = self.field.modulus(&surroundings);
+        let bounds = |program: &Program| {
+            let mut modulus = program.modulus(&surroundings);
+            if !Technique::Levels.is_used(self.without) {
+                modulus.levels.truncate(1);
+            }
+            modulus
+        };
+        let whole = bounds(self.field);
         let tangent = self.field.taylor(&surroundings);
         match (self.rest, whole.levels.first()) {
             (Some(rest), Some(finest)) => {
-                let rest = rest.modulus(&surroundings);
+                let rest = bounds(rest);
                 Clearance::new(&rest, finest.offset, tangent, reach)
             }
             _ => Clearance::new(&whole, 0.0, tangent, reach),

@@ -16,7 +16,9 @@ pub(crate) mod polish;
 pub(crate) mod search;
 pub(crate) mod split;
 pub(crate) mod surface;
+pub(crate) mod techniques;
 pub(crate) mod tracer;
 
 pub(crate) use surface::Surface;
+pub use techniques::Technique;
 pub(crate) use tracer::{Goal, Hit, Ray, Tracer};

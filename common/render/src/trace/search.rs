@@ -22,6 +22,7 @@ use super::grid::Steps;
 use super::means::Means;
 use super::polish::Found;
 use super::surface::Surface;
+use super::techniques::Technique;
 use super::tracer::{Goal, Hit, Ray, Results, Wanted};
 use crate::error::Cancelled;
 
@@ -219,9 +220,10 @@ impl Search {
             }
         }
         let known = surface.clearances.known;
+        let is_foreseen = Technique::Foresight.is_used(surface.without);
         surface.level.vectorize(
             #[inline(always)]
-            || rows.advance(n, known, paths, batch),
+            || rows.advance(n, known, paths, batch, is_foreseen),
         );
     }
 }

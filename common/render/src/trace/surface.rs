@@ -9,6 +9,7 @@ use super::clearance::{Around, Clearances};
 use super::grid::Grid;
 use super::means::{self, Means};
 use super::split::split;
+use super::techniques::Technique;
 use crate::error::RenderError;
 use crate::view::{Footprint, View};
 
@@ -42,14 +43,27 @@ pub(crate) struct Surface {
     pub(crate) moves: bool,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
+    /// A technique that is left out.
+    pub(crate) without: Option<Technique>,
 }
 
 impl Surface {
     /// Compiles the surface for the instants, distances and footprints of one view.
+    #[cfg(test)]
     pub(crate) fn new(
         description: &Description,
         view: &View,
         level: SimdLevel,
+    ) -> Result<Self, RenderError> {
+        Self::without(description, view, level, None)
+    }
+
+    /// The same, with a technique left out.
+    pub(crate) fn without(
+        description: &Description,
+        view: &View,
+        level: SimdLevel,
+        without: Option<Technique>,
     ) -> Result<Self, RenderError> {
         let surface = &description.surface;
         let (start, end) = view.instants();
@@ -62,8 +76,10 @@ impl Surface {
         };
         let program = compile(&surface.graph, surface.field)?;
         let rest = match split(&surface.graph, surface.field, &surface.seed) {
-            Some(split) => Some(compile(&split.graph, split.rest)?),
-            None => None,
+            Some(split) if Technique::Growth.is_used(without) => {
+                Some(compile(&split.graph, split.rest)?)
+            }
+            _ => None,
         };
         let footprint = view.footprint();
         let around = Around {
@@ -75,6 +91,7 @@ impl Surface {
             time,
             eye: view.eye(),
             travel: view.travel(),
+            without,
         };
         let clearances = Clearances::new(&around, nearest(&program, level, view));
         let sight = if footprint.angle > 0.0 {
@@ -86,6 +103,7 @@ impl Surface {
         let mut surface = Self {
             moves: program.moves(),
             means: Means::Values,
+            without,
             program,
             level,
             clearances,
@@ -95,10 +113,12 @@ impl Surface {
             sight,
         };
         let mut allowed = vec![Means::Values];
-        if surface.clearances.have_tangents() {
+        let is_used = |technique: Technique| technique.is_used(without);
+        if surface.clearances.have_tangents() && is_used(Technique::Tangents) {
             allowed.push(Means::Tangents);
         }
-        if surface.clearances.have_errors() && surface.program.looks_ahead() {
+        let looks_ahead = surface.clearances.have_errors() && surface.program.looks_ahead();
+        if looks_ahead && is_used(Technique::Stretches) {
             allowed.push(Means::Stretches);
         }
         if allowed.len() > 1 {

@@ -11,6 +11,7 @@ use super::grid::Grid;
 use super::polish::Polish;
 use super::search::Search;
 use super::surface::Surface;
+use super::techniques::Technique;
 use crate::counts::Counts;
 use crate::error::Cancelled;
 use crate::times::{Part, Stopwatch};
@@ -160,7 +161,9 @@ impl Tracer {
                 end,
             })
         }));
-        bundles.approach(surface, rays, spans, scratch, counts);
+        if Technique::Bundles.is_used(surface.without) {
+            bundles.approach(surface, rays, spans, scratch, counts);
+        }
         let results = Results {
             scratch,
             counts,

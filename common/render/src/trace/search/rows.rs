@@ -130,9 +130,17 @@ impl Rows {
         }
     }
 
-    /// What the values at the first `n` lanes' points prove, and where to look next.
+    /// What the values at the first `n` lanes' points prove, and where to look next: beyond that only if the next
+    /// step `is_foreseen`.
     #[inline(always)]
-    pub(super) fn advance(&mut self, n: usize, known: Known, paths: &Paths, batch: &Batch) {
+    pub(super) fn advance(
+        &mut self,
+        n: usize,
+        known: Known,
+        paths: &Paths,
+        batch: &Batch,
+        is_foreseen: bool,
+    ) {
         let n = n.next_multiple_of(STEP);
         assert!(n <= BATCH);
         // Copies, for all that follows to lie in one place: the compiler then sees that no row is another.
@@ -143,13 +151,13 @@ impl Rows {
             (self.ahead[i], self.behind[i]) = self.spans(i);
         }
         for i in 0..n {
-            self.advance_one(i);
+            self.advance_one(i, is_foreseen);
         }
     }
 
     /// What the value at a lane's point proves, and where to look next.
     #[inline(always)]
-    fn advance_one(&mut self, i: usize) {
+    fn advance_one(&mut self, i: usize, is_foreseen: bool) {
         let steps = self.steps.at(i);
         let (at, clear) = (self.at[i], self.clear[i]);
         let (value, slope) = (self.value[i], self.derivative[i]);
@@ -177,9 +185,13 @@ impl Rows {
         let meet = FORESIGHT * (ahead + behind) / rate;
         let root = proof / -slope;
         // Nothing proven, nothing foreseen: then it may not be a number.
-        let meet = if meet > ahead { meet } else { ahead };
+        let meet = if is_foreseen & (meet > ahead) {
+            meet
+        } else {
+            ahead
+        };
         // The last point within reach: one beyond would not be covered. Past the root it need not be.
-        let target = if (slope < 0.0) & (ahead > NEARLY * root) {
+        let target = if is_foreseen & (slope < 0.0) & (ahead > NEARLY * root) {
             steps.from(at + root)
         } else {
             steps.before(steps.from(at + meet))

@@ -1,0 +1,61 @@
+//! What makes tracing fast, each by name: for measuring what one gains, and for proving that none changes a pixel.
+//!
+//! No scene and no setting names them: images are rendered with all of them. [`crate::ImageRenderer::without`] leaves one out.
+
+/// A technique of the tracer.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Technique {
+    /// Rays that stay close to each other are followed together first.
+    Bundles,
+    /// A value's derivative along the ray proves a stretch, where it is worth its cost.
+    Tangents,
+    /// The range of that derivative on the stretch ahead proves one, where that is worth its cost.
+    Stretches,
+    /// Steps reach beyond what is proven, to where the next one will meet them.
+    Foresight,
+    /// What of the field is a height or a radius is followed exactly, and only the rest is bounded.
+    Growth,
+    /// Fine octaves count as a range far from the surface, and as a slope near it.
+    Levels,
+    /// Bounds are tabled by the distance from the eye, where footprints cut octaves off.
+    Distances,
+    /// Samples are followed along a Morton curve.
+    Curve,
+    /// Samples are followed by slices of the shutter.
+    Slices,
+}
+
+impl Technique {
+    /// Every technique.
+    pub const ALL: [Self; 9] = [
+        Self::Bundles,
+        Self::Tangents,
+        Self::Stretches,
+        Self::Foresight,
+        Self::Growth,
+        Self::Levels,
+        Self::Distances,
+        Self::Curve,
+        Self::Slices,
+    ];
+
+    /// What it is called.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Bundles => "bundles",
+            Self::Tangents => "tangents",
+            Self::Stretches => "stretches ahead",
+            Self::Foresight => "foresight",
+            Self::Growth => "known growth",
+            Self::Levels => "levels by value",
+            Self::Distances => "tables by distance",
+            Self::Curve => "Morton curve",
+            Self::Slices => "shutter slices",
+        }
+    }
+
+    /// Whether it is used where `without` is left out.
+    pub(crate) fn is_used(self, without: Option<Self>) -> bool {
+        without != Some(self)
+    }
+}
