@@ -12,6 +12,7 @@ use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::Function;
 use crate::range::interval::curve_over;
+use crate::range::noise;
 use crate::shape::Shape;
 
 /// All values of a function over a region, and all of its derivatives by `N` variables.
@@ -204,23 +205,47 @@ impl<const N: usize> Arithmetic for Slope<N> {
     }
 
     fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
-        let value = noise.over(at.each_ref().map(Self::range));
-        composed(value, noise.slope() + noise.slope_rounding(), &at)
+        let mut result = noise::any(noise, at);
+        let (steepest, rough) = (noise.slope(), noise.slope_rounding());
+        for (i, slope) in result.slopes.iter_mut().enumerate() {
+            let rates = at.each_ref().map(|part| part.slopes[i].magnitude());
+            // An f32 gradient's components are each that far from the exact ones.
+            *slope = within(*slope, steepest, &rates).expand(rough * rates.iter().sum::<f64>());
+        }
+        result
     }
 
     fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
-        let values = noise.slopes_over(at.each_ref().map(Self::range));
-        values.map(|value| composed(value, noise.bend(), &at))
+        let bend = noise.bend();
+        slopes_over(noise, at.each_ref().map(Self::range)).map(|value| Self {
+            value,
+            slopes: std::array::from_fn(|i| {
+                let rates = at.each_ref().map(|part| part.slopes[i].magnitude());
+                within(Interval::ALL, bend, &rates)
+            }),
+        })
     }
 }
 
-/// A function of three numbers that is nowhere steeper than `steepest`.
-fn composed<const N: usize>(value: Interval, steepest: f64, at: &[Slope<N>; 3]) -> Slope<N> {
-    let mut slopes = [Interval::point(0.0); N];
-    for (i, slope) in slopes.iter_mut().enumerate() {
-        let [x, y, z] = at.each_ref().map(|part| part.slopes[i].magnitude());
-        let most = steepest * (x * x + y * y + z * z).sqrt();
-        *slope = Interval::new(-most, most).widen();
+/// What of some slopes along a way at these rates a function can have that is nowhere steeper than `steepest`.
+fn within(slopes: Interval, steepest: f64, [x, y, z]: &[f64; 3]) -> Interval {
+    let most = steepest * (x * x + y * y + z * z).sqrt();
+    if most.is_finite() {
+        slopes.meet(Interval::new(-most, most).widen())
+    } else {
+        slopes
     }
-    Slope { value, slopes }
+}
+
+/// All components of a noise's gradient over a box of its coordinates: those of its kernels, or, if that says less,
+/// the gradient midway and its steepest change on either side.
+pub(super) fn slopes_over(noise: &Noise, spans: [Interval; 3]) -> [Interval; 3] {
+    let at = [0, 1, 2].map(|axis| {
+        let mut rates = [0.0; 3];
+        rates[axis] = 1.0;
+        Slope::<3>::of_variables(spans[axis], rates)
+    });
+    let kernels = Slope::any_noise(noise, at).slopes;
+    let midway = noise.slopes_over(spans);
+    [0, 1, 2].map(|axis| midway[axis].meet(kernels[axis]))
 }

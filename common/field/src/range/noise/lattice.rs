@@ -1,10 +1,12 @@
-//! Gradient noise in any arithmetic: the sum of the kernels whose support a place or range touches, thesis eqs. (4.1), (4.9).
+//! Lattice noises in any arithmetic: gradient, value and value-gradient, thesis eqs. (4.9), (4.11), (4.12).
 //!
-//! Each kernel is (ξ·d) h(d₁) h(d₂) h(d₃). The profiles h are single steps (Chebyshev bands of the quintic,
+//! Each kernel is (ξ₀ + ξ·d) h(d₁) h(d₂) h(d₃). The profiles h are single steps (Chebyshev bands of the quintic,
 //! thesis §5.4.2), the product ξ·d keeps all correlation, and what symbols the kernel made besides are condensed when it
 //! is done: standard affine arithmetic inside a kernel, reduced outside, gives the same as reduced throughout.
 
-use crate::interval::{Interval, smaller};
+use super::FAR;
+use crate::interval::{Interval, larger, smaller};
+use crate::noise::lattice::{Corner, parts};
 use crate::noise::{self, Lattice};
 use crate::range::Arithmetic;
 use crate::range::function::Function;
@@ -12,13 +14,10 @@ use crate::range::function::Function;
 /// Beyond so many kernels the noise's range says as much as their sum.
 const KERNELS_MAX: usize = 64;
 
-/// Beyond so many cells from the origin there are no offsets within cells.
-const FAR: f64 = 1e15;
-
 /// How far evaluation in f32 may be from the exact noise: its own rounding, and that of three offsets to 2⁻²⁵ at the steepest slope.
-pub(crate) const BLUR: f64 = noise::ROUNDING + noise::SLOPE * 5.2e-8;
+pub(crate) const BLUR: f64 = noise::ROUNDING + noise::SLOPE * super::OFFSETS;
 
-/// All values of the noise, rounding included.
+/// All values of gradient noise, rounding included.
 pub(crate) const RANGE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
 
 /// The lattice planes of one axis that a number is near, with the way from each and the profile there.
@@ -29,7 +28,7 @@ struct Axis<T> {
 impl<T: Arithmetic> Axis<T> {
     fn new(at: &T, span: Interval) -> Self {
         let first = span.low.floor();
-        let last = crate::interval::larger(span.high.ceil(), first + 1.0);
+        let last = larger(span.high.ceil(), first + 1.0);
         let mut planes = Vec::new();
         let mut plane = first;
         while plane <= last {
@@ -47,28 +46,41 @@ fn planes(span: Interval) -> f64 {
     smaller(span.high.ceil() - span.low.floor(), 1e9) + 1.0
 }
 
-/// The noise at `at`.
+/// Gradient noise at `at`.
 pub(crate) fn gradient_noise<T: Arithmetic>(lattice: Lattice, at: [T; 3]) -> T {
+    match sum(Corner::Gradient, lattice, &at) {
+        Some(sum) => sum.blurred(BLUR).within(RANGE),
+        None => T::any(RANGE),
+    }
+}
+
+/// The exact noise; `None` where it is too far or too wide.
+pub(super) fn sum<T: Arithmetic>(corner: Corner, lattice: Lattice, at: &[T; 3]) -> Option<T> {
     let spans = at.each_ref().map(T::range);
     let near = spans
         .iter()
         .all(|span| span.low <= span.high && span.magnitude() < FAR);
     let kernels: f64 = spans.iter().map(|span| planes(*span)).product();
     if !near || kernels > KERNELS_MAX as f64 {
-        return T::any(RANGE);
+        return None;
     }
     let [x, y, z] = [0, 1, 2].map(|axis| Axis::new(&at[axis], spans[axis]).planes);
     // h₁ (Σ h₂ (Σ h₃ ξ·d)): the same sum with a third of the products, and tighter, since ranges only lose by being spread.
     let sum = total(&x, |i, dx| {
         total(&y, |j, dy| {
             total(&z, |k, dz| {
-                let xi = noise::node_gradient(lattice, [i, j, k]);
-                along(xi, [dx, dy, dz])
+                let (height, xi) = parts(corner, noise::node_hash(lattice, [i, j, k]));
+                let slope = along(xi, [dx, dy, dz]);
+                match (corner, slope) {
+                    (Corner::Gradient, Some(slope)) => slope,
+                    (_, Some(slope)) => slope.plus(T::constant(height)),
+                    (_, None) => T::constant(height),
+                }
             })
         })
-        .settled(&at)
+        .settled(at)
     });
-    sum.blurred(BLUR).within(RANGE)
+    Some(sum)
 }
 
 /// Σ h(d) · term over the planes of an axis.
@@ -84,8 +96,8 @@ fn total<T: Arithmetic>(planes: &[(u32, T, T)], term: impl Fn(u32, &T) -> T) -> 
     sum.unwrap_or_else(|| T::constant(0.0))
 }
 
-/// ξ·d, of the two components of ξ that are not zero.
-fn along<T: Arithmetic>(xi: [f64; 3], ways: [&T; 3]) -> T {
+/// ξ·d, of the components of ξ that are not zero; they are ±1.
+pub(super) fn along<T: Arithmetic>(xi: [f64; 3], ways: [&T; 3]) -> Option<T> {
     let mut sum: Option<T> = None;
     for (part, way) in xi.into_iter().zip(ways) {
         if part != 0.0 {
@@ -100,5 +112,5 @@ fn along<T: Arithmetic>(xi: [f64; 3], ways: [&T; 3]) -> T {
             });
         }
     }
-    sum.unwrap_or_else(|| T::constant(0.0))
+    sum
 }
