@@ -193,6 +193,12 @@ impl Function {
         if let Self::Profile(profile) = self {
             return profile.image(a);
         }
+        if self == Self::Quintic {
+            // It falls from 0 on, on both sides.
+            let far = a.abs();
+            let image = Interval::new(self.value(far.high), self.value(far.low));
+            return image.expand(self.slack());
+        }
         let (low, high) = self.extremes(0.0, a);
         let image = Interval::new(low, high).expand(self.slack());
         match self {

@@ -65,6 +65,11 @@ pub(crate) trait Arithmetic: Number {
     /// The same number, with room for an error; at a point, the same.
     fn blurred(self, error: f64) -> Self;
 
+    /// The same number, with room for how far what is computed in f32 may be from it.
+    fn computed(self, error: f64) -> Self {
+        self.blurred(error)
+    }
+
     /// Any number between the two; a point arithmetic is never asked and answers the first.
     fn hull(self, other: Self) -> Self;
 

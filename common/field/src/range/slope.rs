@@ -16,15 +16,17 @@ use crate::range::noise;
 use crate::shape::Shape;
 
 /// All values of a function over a region, and all of its derivatives by `N` variables.
+///
+/// `EXACT` ones hold the exact field alone, without room for the f32 that noises are computed in: a reference.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Slope<const N: usize> {
+pub struct Slope<const N: usize, const EXACT: bool = false> {
     /// The values.
     pub value: Interval,
     /// The derivatives.
     pub slopes: [Interval; N],
 }
 
-impl<const N: usize> Slope<N> {
+impl<const N: usize, const EXACT: bool> Slope<N, EXACT> {
     /// Values over a region through which variable `i` runs at a rate of `rates[i]` per unit.
     pub const fn of_variables(value: Interval, rates: [f64; N]) -> Self {
         let mut slopes = [Interval::point(0.0); N];
@@ -57,7 +59,7 @@ impl<const N: usize> Slope<N> {
     }
 }
 
-impl<const N: usize> Number for Slope<N> {
+impl<const N: usize, const EXACT: bool> Number for Slope<N, EXACT> {
     fn constant(value: f64) -> Self {
         Self::of_variables(Interval::point(value), [0.0; N])
     }
@@ -136,7 +138,7 @@ impl<const N: usize> Number for Slope<N> {
     }
 }
 
-impl<const N: usize> Arithmetic for Slope<N> {
+impl<const N: usize, const EXACT: bool> Arithmetic for Slope<N, EXACT> {
     fn any(range: Interval) -> Self {
         Self {
             value: range,
@@ -160,6 +162,10 @@ impl<const N: usize> Arithmetic for Slope<N> {
             value: self.value.expand(error),
             ..self
         }
+    }
+
+    fn computed(self, error: f64) -> Self {
+        if EXACT { self } else { self.blurred(error) }
     }
 
     fn hull(self, other: Self) -> Self {
@@ -207,6 +213,7 @@ impl<const N: usize> Arithmetic for Slope<N> {
     fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
         let mut result = noise::any(noise, at);
         let (steepest, rough) = (noise.slope(), noise.slope_rounding());
+        let rough = if EXACT { 0.0 } else { rough };
         for (i, slope) in result.slopes.iter_mut().enumerate() {
             let rates = at.each_ref().map(|part| part.slopes[i].magnitude());
             // An f32 gradient's components are each that far from the exact ones.
@@ -245,7 +252,7 @@ pub(super) fn slopes_over(noise: &Noise, spans: [Interval; 3]) -> [Interval; 3] 
         rates[axis] = 1.0;
         Slope::<3>::of_variables(spans[axis], rates)
     });
-    let kernels = Slope::any_noise(noise, at).slopes;
+    let kernels = Slope::<3>::any_noise(noise, at).slopes;
     let midway = noise.slopes_over(spans);
     [0, 1, 2].map(|axis| midway[axis].meet(kernels[axis]))
 }

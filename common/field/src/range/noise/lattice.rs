@@ -20,25 +20,26 @@ pub(crate) const BLUR: f64 = noise::ROUNDING + noise::SLOPE * super::OFFSETS;
 /// All values of gradient noise, rounding included.
 pub(crate) const RANGE: Interval = Interval::new(-noise::RANGE, noise::RANGE);
 
-/// The lattice planes of one axis that a number is near, with the way from each and the profile there.
-struct Axis<T> {
-    planes: Vec<(u32, T, T)>,
+/// A plane's number, the way from it and the profile there.
+type Plane<T> = (u32, T, T);
+
+fn plane<T: Arithmetic>(at: &T, plane: f64) -> Plane<T> {
+    let way = at.clone().minus(T::constant(plane));
+    let profile = way.clone().apply(Function::Quintic);
+    (noise::split(plane).0, way, profile)
 }
 
-impl<T: Arithmetic> Axis<T> {
-    fn new(at: &T, span: Interval) -> Self {
-        let first = span.low.floor();
-        let last = larger(span.high.ceil(), first + 1.0);
-        let mut planes = Vec::new();
-        let mut plane = first;
-        while plane <= last {
-            let way = at.clone().minus(T::constant(plane));
-            let profile = way.clone().apply(Function::Quintic);
-            planes.push((noise::split(plane).0, way, profile));
-            plane += 1.0;
-        }
-        Self { planes }
+/// All planes that a number is near.
+fn many<T: Arithmetic>(at: &T, span: Interval) -> Vec<Plane<T>> {
+    let first = span.low.floor();
+    let last = larger(span.high.ceil(), first + 1.0);
+    let mut planes = Vec::new();
+    let mut next = first;
+    while next <= last {
+        planes.push(plane(at, next));
+        next += 1.0;
     }
+    planes
 }
 
 /// How many planes an interval touches.
@@ -49,7 +50,7 @@ fn planes(span: Interval) -> f64 {
 /// Gradient noise at `at`.
 pub(crate) fn gradient_noise<T: Arithmetic>(lattice: Lattice, at: [T; 3]) -> T {
     match sum(Corner::Gradient, lattice, &at) {
-        Some(sum) => sum.blurred(BLUR).within(RANGE),
+        Some(sum) => sum.computed(BLUR).within(RANGE),
         None => T::any(RANGE),
     }
 }
@@ -64,11 +65,28 @@ pub(super) fn sum<T: Arithmetic>(corner: Corner, lattice: Lattice, at: &[T; 3]) 
     if !near || kernels > KERNELS_MAX as f64 {
         return None;
     }
-    let [x, y, z] = [0, 1, 2].map(|axis| Axis::new(&at[axis], spans[axis]).planes);
-    // h₁ (Σ h₂ (Σ h₃ ξ·d)): the same sum with a third of the products, and tighter, since ranges only lose by being spread.
-    let sum = total(&x, |i, dx| {
-        total(&y, |j, dy| {
-            total(&z, |k, dz| {
+    if kernels == 8.0 {
+        // Within one cell, as almost always along a short part of a ray.
+        let [x, y, z] = [0, 1, 2].map(|axis| {
+            let first = spans[axis].low.floor();
+            [plane(&at[axis], first), plane(&at[axis], first + 1.0)]
+        });
+        return Some(of_planes(corner, lattice, at, [&x, &y, &z]));
+    }
+    let [x, y, z] = [0, 1, 2].map(|axis| many(&at[axis], spans[axis]));
+    Some(of_planes(corner, lattice, at, [&x, &y, &z]))
+}
+
+/// h₁ (Σ h₂ (Σ h₃ ξ·d)): the same sum with a third of the products, and tighter, since ranges only lose by being spread.
+fn of_planes<T: Arithmetic>(
+    corner: Corner,
+    lattice: Lattice,
+    at: &[T; 3],
+    [x, y, z]: [&[Plane<T>]; 3],
+) -> T {
+    total(x, |i, dx| {
+        total(y, |j, dy| {
+            total(z, |k, dz| {
                 let (height, xi) = parts(corner, noise::node_hash(lattice, [i, j, k]));
                 let slope = along(xi, [dx, dy, dz]);
                 match (corner, slope) {
@@ -79,12 +97,11 @@ pub(super) fn sum<T: Arithmetic>(corner: Corner, lattice: Lattice, at: &[T; 3]) 
             })
         })
         .settled(at)
-    });
-    Some(sum)
+    })
 }
 
 /// Σ h(d) · term over the planes of an axis.
-fn total<T: Arithmetic>(planes: &[(u32, T, T)], term: impl Fn(u32, &T) -> T) -> T {
+fn total<T: Arithmetic>(planes: &[Plane<T>], term: impl Fn(u32, &T) -> T) -> T {
     let mut sum: Option<T> = None;
     for (plane, way, profile) in planes {
         let part = profile.clone().mul(term(*plane, way));
@@ -101,14 +118,12 @@ pub(super) fn along<T: Arithmetic>(xi: [f64; 3], ways: [&T; 3]) -> Option<T> {
     let mut sum: Option<T> = None;
     for (part, way) in xi.into_iter().zip(ways) {
         if part != 0.0 {
-            let term = if part > 0.0 {
-                way.clone()
-            } else {
-                way.clone().neg()
-            };
-            sum = Some(match sum {
-                Some(sum) => sum.plus(term),
-                None => term,
+            let way = way.clone();
+            sum = Some(match (sum, part > 0.0) {
+                (Some(sum), true) => sum.plus(way),
+                (Some(sum), false) => sum.minus(way),
+                (None, true) => way,
+                (None, false) => way.neg(),
             });
         }
     }

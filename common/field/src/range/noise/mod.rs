@@ -38,7 +38,7 @@ pub(crate) fn any<T: Arithmetic>(noise: &Noise, at: [T; 3]) -> T {
     };
     match sum {
         Some(sum) => sum
-            .blurred(noise.rounding() + noise.slope() * OFFSETS)
+            .computed(noise.rounding() + noise.slope() * OFFSETS)
             .within(range),
         None => T::any(range),
     }

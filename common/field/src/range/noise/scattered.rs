@@ -56,18 +56,30 @@ fn nodes<T: Arithmetic>(
     let profile = Function::Profile(Profile::Radial(sparse.kernel));
     let mut sum: Option<T> = None;
     let (mut count, mut heights) = (0.0, 0.0);
+    // What the kernels can be without any correlation: over wide spans that says more than forms do.
+    let mut apart = Interval::point(0.0);
     let mut add = |state: u32, index: u32, node: [f64; 3]| {
         if square(near.least(node)) > 1.0 + REACHED {
             return;
         }
         let q = measure(state, index, near.from(node));
-        if q.range().low > 1.0 + REACHED * rougher {
+        let far = q.range();
+        // Spots are nowhere wider than plain kernels.
+        let far = far.meet(Interval::new(square(near.least(node)), f64::INFINITY).widen());
+        if far.low > 1.0 + REACHED * rougher {
             return;
         }
         let xi = f64::from(height(draw(state, index, 3)) * HEIGHT);
         count += 1.0;
         heights += xi.abs();
-        let part = q.apply(profile).times(xi).settled(at);
+        let image = profile.image(far);
+        apart = apart.add(image.mul(Interval::point(xi)));
+        let part = q
+            .within(far)
+            .apply(profile)
+            .within(image)
+            .times(xi)
+            .settled(at);
         sum = Some(match sum.take() {
             Some(sum) => sum.plus(part),
             None => part,
@@ -98,7 +110,7 @@ fn nodes<T: Arithmetic>(
     // A sum of n terms adds n · 2⁻²⁴ of their total.
     let blur = heights * (rougher * kernel + count * 6e-8);
     match sum {
-        Some(sum) => sum.settled(at).blurred(blur).within(range),
+        Some(sum) => sum.settled(at).within(apart).computed(blur).within(range),
         None => T::constant(0.0),
     }
 }
