@@ -2,6 +2,8 @@
 //! [`peers`] compares this renderer with other programs.
 
 pub(crate) mod cast;
+pub(crate) mod cells;
+pub(crate) mod clock;
 pub(crate) mod peers;
 pub(crate) mod report;
 pub(crate) mod thesis;
