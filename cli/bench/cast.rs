@@ -1,12 +1,11 @@
 //! Casting rays with each method and counting what it takes.
 
-use std::time::Instant;
-
-use field::{Interval, Program};
+use field::Interval;
 use render::methods::{FieldAlong, Method, Tally};
 use serde::Serialize;
 
-use super::thesis;
+use super::clock::Clock;
+use super::thesis::Setting;
 
 /// What one method took, on average over the rays that meet the bounding sphere.
 #[derive(Serialize, Clone, Debug)]
@@ -29,47 +28,60 @@ pub(crate) struct Count {
     pub(crate) hits: u64,
     /// Rays that were cast.
     pub(crate) rays: u64,
-    /// Microseconds per ray on this machine, one thread.
+    /// Microseconds of one thread per ray on this machine.
     pub(crate) microseconds: f64,
 }
 
-/// Casts the rays of a grid of `side`² pixels.
+/// Casts the rays of a grid of `side`² places of the image by a method of the thesis.
 pub(crate) fn cast(
-    program: &Program,
-    radius: f64,
+    setting: &Setting,
     side: u32,
     method: &dyn Method,
     (lipschitz, epsilon): (Option<f64>, f64),
 ) -> Count {
-    let mut tally = Tally::default();
-    let (mut rays, mut hits) = (0, 0);
-    let started = Instant::now();
-    for y in 0..side {
-        for x in 0..side {
-            let at = |i: u32| ((f64::from(i) + 0.5) / f64::from(side) - 0.5) * thesis::WIDTH;
-            let (across, up) = (at(x), at(y));
-            let square = radius * radius - across * across - up * up;
-            if square <= 0.0 {
-                continue;
-            }
-            let half = square.sqrt();
-            let ray = FieldAlong {
-                program,
-                origin: [across, -thesis::DISTANCE, up],
-                direction: [0.0, 1.0, 0.0],
-                time: 0.0,
-            };
-            let span = Interval::new(thesis::DISTANCE - half, thesis::DISTANCE + half);
-            rays += 1;
-            hits += u64::from(method.first(&ray, span, &mut tally).is_some());
-        }
-    }
-    let seconds = started.elapsed().as_secs_f64();
-    let per_ray = |count: u64| count as f64 / rays as f64;
+    let count = cast_by(setting, side, method.name(), |ray, span, tally| {
+        method.first(ray, span, tally)
+    });
     Count {
-        method: method.name(),
         lipschitz,
         epsilon,
+        ..count
+    }
+}
+
+/// The same by anything that finds a first root.
+pub(crate) fn cast_by(
+    setting: &Setting,
+    side: u32,
+    method: &'static str,
+    first: impl Fn(&FieldAlong<'_>, Interval, &mut Tally) -> Option<f64>,
+) -> Count {
+    let mut tally = Tally::default();
+    let (mut rays, mut hits) = (0, 0);
+    let clock = Clock::start();
+    for y in 0..side {
+        for x in 0..side {
+            let at = |i: u32| (f64::from(i) + 0.5) / f64::from(side) - 0.5;
+            let (origin, direction) = setting.ray([at(x), at(y)]);
+            let Some(span) = within(setting.radius, origin, direction) else {
+                continue;
+            };
+            let ray = FieldAlong {
+                program: &setting.program,
+                origin,
+                direction,
+                time: 0.0,
+            };
+            rays += 1;
+            hits += u64::from(first(&ray, span, &mut tally).is_some());
+        }
+    }
+    let seconds = clock.seconds();
+    let per_ray = |count: u64| count as f64 / rays as f64;
+    Count {
+        method,
+        lipschitz: None,
+        epsilon: 0.0,
         evaluations: per_ray(tally.evaluations()),
         steps: per_ray(tally.steps),
         backtracks: per_ray(tally.backtracks),
@@ -78,4 +90,15 @@ pub(crate) fn cast(
         rays,
         microseconds: 1e6 * seconds / rays as f64,
     }
+}
+
+/// The part of a ray within a sphere about the origin.
+fn within(radius: f64, origin: [f64; 3], direction: [f64; 3]) -> Option<Interval> {
+    let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let middle = -dot(origin, direction);
+    let square = radius * radius - dot(origin, origin) + middle * middle;
+    (square > 0.0).then(|| {
+        let half = square.sqrt();
+        Interval::new(middle - half, middle + half)
+    })
 }

@@ -3,6 +3,8 @@
 //! tracer with itself.
 
 pub(crate) mod cast;
+pub(crate) mod cells;
+pub(crate) mod clock;
 pub(crate) mod peers;
 pub(crate) mod report;
 pub(crate) mod techniques;

@@ -5,12 +5,12 @@ mod techniques;
 mod threads;
 
 use clap::{Args, Subcommand};
-use field::{Interval, Program};
 use render::methods::{Hit, Method, Mitchell, Optimised, Speculative, SphereTracing, Subdivision};
 
-use crate::bench::cast::{Count, cast};
+use crate::bench::cast::{Count, cast, cast_by};
+use crate::bench::cells::{Cells, Known};
 use crate::bench::report::{Measured, Tables, Thesis};
-use crate::bench::thesis::{self, Row};
+use crate::bench::thesis::{Experiment, NAMES, Noise, Setting, lipschitz};
 use crate::error::{Ending, Error};
 use crate::options::Context;
 use crate::output;
@@ -30,13 +30,18 @@ pub(crate) enum BenchCommand {
 #[derive(Args, Debug)]
 pub(crate) struct Options {
     /// Pixels along a side of the grid of rays that samples the thesis's 800×800.
-    #[arg(long, value_name = "N", default_value_t = 64,
+    #[arg(long, value_name = "N", default_value_t = 40,
           value_parser = clap::value_parser!(u32).range(2..=800))]
     side: u32,
 
-    /// ε in metres: steps and intervals below it end a search. The thesis does not say its own.
-    #[arg(long, value_name = "METRES", default_value = "1e-7", value_parser = epsilon)]
-    epsilon: f64,
+    /// Noises to measure [default: all].
+    #[arg(long, value_name = "NOISE", value_delimiter = ',',
+          value_parser = clap::builder::PossibleValuesParser::new(NAMES))]
+    noise: Vec<String>,
+
+    /// ε in metres instead of that of the experiment, a thousandth of a pixel.
+    #[arg(long, value_name = "METRES", value_parser = epsilon)]
+    epsilon: Option<f64>,
 }
 
 fn epsilon(text: &str) -> Result<f64, String> {
@@ -51,7 +56,7 @@ fn epsilon(text: &str) -> Result<f64, String> {
 pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Error> {
     match command {
         BenchCommand::Thesis(options) => {
-            output::print(context.output, &tables(&options))?;
+            output::print(context.output, &tables(&options)?)?;
             Ok(Ending::Done)
         }
         BenchCommand::Peers(options) => peers::run(context, &options),
@@ -60,68 +65,93 @@ pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Er
     }
 }
 
-fn tables(options: &Options) -> Tables {
+fn tables(options: &Options) -> Result<Tables, Error> {
+    let experiment = Experiment::embedded()
+        .map_err(|reason| Error::failed("the experiment has a mistake").because(reason))?;
+    let epsilon = options.epsilon.unwrap_or(experiment.epsilon);
     let mut tables = Tables {
         side: options.side,
-        epsilon: options.epsilon,
+        epsilon,
         noises: Vec::new(),
         left_out: Vec::new(),
     };
-    for row in &thesis::ROWS {
-        match program(row) {
-            Ok(program) => tables.noises.push(measured(row, &program, options)),
+    for noise in &experiment.noises {
+        if !options.noise.is_empty() && !options.noise.contains(&noise.name) {
+            continue;
+        }
+        let grain = Grain {
+            side: options.side,
+            epsilon,
+            overshoot: experiment.overshoot,
+        };
+        let measured = noise.setting().and_then(|setting| {
+            let measured = measured(noise, &setting, grain)?;
+            measured.ok_or_else(|| "the thesis has no row of it".to_owned())
+        });
+        match measured {
+            Ok(measured) => tables.noises.push(measured),
             Err(reason) => tables
                 .left_out
-                .push(format!("{} noise: {reason}", row.noise)),
+                .push(format!("{} noise: {reason}", noise.name)),
         }
     }
-    tables
+    Ok(tables)
 }
 
-fn program(row: &Row) -> Result<Program, String> {
-    let alone = scene::expression(&row.field(), &[]).map_err(|error| error.to_string())?;
-    Program::compile(&alone.graph, &[alone.root], Interval::point(0.0))
-        .map_err(|error| error.to_string())
+/// How finely is measured.
+#[derive(Clone, Copy)]
+struct Grain {
+    side: u32,
+    epsilon: f64,
+    overshoot: f64,
 }
 
-fn measured(row: &Row, program: &Program, options: &Options) -> Measured {
+fn measured(noise: &Noise, setting: &Setting, grain: Grain) -> Result<Option<Measured>, String> {
+    let Some(found) = noise.found() else {
+        return Ok(None);
+    };
     let hit = Hit::Converged;
+    let Grain {
+        side,
+        epsilon,
+        overshoot,
+    } = grain;
     let run = |method: &dyn Method, lipschitz: Option<f64>, epsilon: f64| {
-        cast(
-            program,
-            row.radius(),
-            options.side,
-            method,
-            (lipschitz, epsilon),
-        )
+        cast(setting, side, method, (lipschitz, epsilon))
     };
     let speculative = |noise: f64, epsilon: f64| {
-        let lipschitz = Row::lipschitz(noise);
+        let lipschitz = lipschitz(noise);
         let method = Speculative {
             lipschitz,
-            overshoot: thesis::OVERSHOOT,
+            overshoot,
             epsilon,
             hit,
         };
         run(&method, Some(lipschitz), epsilon)
     };
-    let epsilon = options.epsilon;
     let mut tracing: Vec<Count> = Vec::new();
-    let differing = row
-        .lipschitz_true
-        .filter(|exact| *exact != row.lipschitz_thesis);
-    for noise in [Some(row.lipschitz_thesis), differing]
-        .into_iter()
-        .flatten()
-    {
-        let lipschitz = Row::lipschitz(noise);
+    for &lambda in &noise.lambda {
+        let lipschitz = lipschitz(lambda);
         let method = SphereTracing {
             lipschitz,
             epsilon,
             hit,
         };
         tracing.push(run(&method, Some(lipschitz), epsilon));
-        tracing.push(speculative(noise, epsilon));
+        tracing.push(speculative(lambda, epsilon));
+    }
+    let mut cells = Vec::new();
+    if noise.cells {
+        let (_, direction) = setting.ray([0.0; 2]);
+        for (name, known) in [
+            ("λ_N of each cell", Known::Length),
+            ("the fall of each cell along the ray", Known::Fall),
+        ] {
+            let table = Cells::new(direction, known)?;
+            cells.push(cast_by(setting, side, name, |ray, span, tally| {
+                table.first(ray, span, epsilon, tally)
+            }));
+        }
     }
     let methods: [&dyn Method; 5] = [
         &Subdivision::interval(epsilon, hit),
@@ -135,17 +165,21 @@ fn measured(row: &Row, program: &Program, options: &Options) -> Measured {
         .map(|method| run(method, None, epsilon))
         .collect();
     let mut sensitivity = Vec::new();
-    for epsilon in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7] {
-        sensitivity.push(speculative(row.lipschitz_thesis, epsilon));
+    for epsilon in [1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8] {
+        sensitivity.push(speculative(noise.lambda[0], epsilon));
+        sensitivity.push(run(&Subdivision::reduced(epsilon, hit), None, epsilon));
         sensitivity.push(run(&Optimised { epsilon, hit }, None, epsilon));
     }
-    Measured {
-        noise: row.noise,
-        field: row.field(),
-        normalisation: row.normalisation,
+    Ok(Some(Measured {
+        noise: noise.name.clone(),
+        field: setting.field.clone(),
+        overshoot,
+        lambda: noise.lambda.clone(),
+        normalisation: noise.normalisation.clone(),
         tracing,
+        cells,
         casting,
         sensitivity,
-        thesis: Thesis::new(row),
-    }
+        thesis: Thesis::new(found),
+    }))
 }

@@ -89,7 +89,22 @@ impl Interval {
         Self::new(-self.high, -self.low)
     }
 
+    #[inline]
     pub(crate) fn mul(self, other: Self) -> Self {
+        let [a, b] = [self.low * other.low, self.low * other.high];
+        let [c, d] = [self.high * other.low, self.high * other.high];
+        // Finite products need no rule for 0 · ∞.
+        if (a + b + c + d).is_finite() {
+            let low = smaller(smaller(a, b), smaller(c, d));
+            let high = larger(larger(a, b), larger(c, d));
+            return Self::new(low, high).widen();
+        }
+        self.mul_unbounded(other)
+    }
+
+    /// The product where an end is infinite, or a product too large for a sum.
+    #[cold]
+    fn mul_unbounded(self, other: Self) -> Self {
         let products = [
             product(self.low, other.low),
             product(self.low, other.high),

@@ -28,6 +28,6 @@ pub(crate) mod wavelet;
 
 pub use gradient::{BEND, RANGE, ROUNDING, SLOPE, noise, noise_gradient};
 pub(crate) use gradient::{
-    Lattice, corners, mean_gradient, node_gradient, split, value, value_along, value_bend,
+    Lattice, corners, gradient_of, mean_gradient, node_hash, split, value, value_along, value_bend,
 };
 pub(crate) use kind::Noise;

@@ -29,7 +29,7 @@ pub const NORM_MAX: f64 = 16.0;
 
 /// How distance is measured, thesis eq. (4.20).
 #[derive(Clone, Copy, PartialEq, Debug)]
-enum Norm {
+pub(crate) enum Norm {
     /// p = 1, Manhattan.
     One,
     /// p = 2, Euclid.
@@ -56,7 +56,13 @@ impl Norm {
     /// A number that rises with the length of a vector, quicker to have than the length.
     #[inline(always)]
     fn measure(self, d: [f32; 3]) -> f64 {
-        let [x, y, z] = d.map(|d| f64::from(d.abs()));
+        self.measure_of(d.map(f64::from))
+    }
+
+    /// The same of numbers that are no f32.
+    #[inline(always)]
+    fn measure_of(self, d: [f64; 3]) -> f64 {
+        let [x, y, z] = d.map(f64::abs);
         match self {
             Self::One => x + y + z,
             Self::Two => x * x + y * y + z * z,
@@ -76,6 +82,11 @@ impl Norm {
             Self::Two => measure.sqrt(),
             Self::Other(p) => libm::pow(measure, 1.0 / p),
         }
+    }
+
+    /// The length of a vector.
+    pub(crate) fn length_of(self, d: [f64; 3]) -> f64 {
+        self.length(self.measure_of(d))
     }
 
     /// The gradient of the length at a vector that long, thesis eq. (4.19), mended: ERRATA row 1596.
@@ -201,6 +212,33 @@ impl Cellular {
             counts: poisson(options.density),
             reach,
         }
+    }
+
+    /// How distances are measured.
+    pub(crate) fn norm(&self) -> Norm {
+        self.norm
+    }
+
+    /// The weights of the distances that count.
+    pub(crate) fn weights(&self) -> &[f64] {
+        &self.weights[..self.orders]
+    }
+
+    /// Whether ψ(d) is d² instead of d.
+    pub(crate) fn squares(&self) -> bool {
+        self.squared
+    }
+
+    /// What is taken away from the sum.
+    pub(crate) fn bias(&self) -> f64 {
+        self.bias
+    }
+
+    /// The nodes of a cell, as places within it.
+    pub(crate) fn nodes(&self, cell: [u32; 3]) -> impl Iterator<Item = [f64; 3]> + use<> {
+        let state = cell_state(self.lattice, cell);
+        (0..self.count(state))
+            .map(move |index| [0, 1, 2].map(|axis| f64::from(fraction(draw(state, index, axis)))))
     }
 
     /// ψ at its greatest argument.

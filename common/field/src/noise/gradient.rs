@@ -142,11 +142,16 @@ fn corner(row: u32, z: u32) -> u32 {
     hash::finish_high(hash::absorb(row, z))
 }
 
-/// The gradient at a lattice point: two components are ±1, one is 0.
-pub(crate) fn node_gradient(lattice: Lattice, [x, y, z]: [u32; 3]) -> [f64; 3] {
+/// The hash of a lattice point.
+pub(crate) fn node_hash(lattice: Lattice, [x, y, z]: [u32; 3]) -> u32 {
     let row = hash::absorb(hash::absorb(lattice.0, x), y);
+    corner(row, z)
+}
+
+/// The gradient that a lattice point's hash stands for: two components are ±1, one is 0.
+pub(crate) fn gradient_of(hash: u32) -> [f64; 3] {
     let mut gradient = [0.0; 3];
-    add_gradient(&mut gradient, corner(row, z), 1.0);
+    add_gradient(&mut gradient, hash, 1.0);
     gradient.map(f64::from)
 }
 

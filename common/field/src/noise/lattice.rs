@@ -84,6 +84,16 @@ fn node<R: Real>(corner: Corner, hash: u32, x: R, y: R, z: R) -> R {
     }
 }
 
+/// ξ₀ and ξ of a lattice point, from its hash; 0 for what the noise does not have.
+pub(crate) fn parts(corner: Corner, hash: u32) -> (f64, [f64; 3]) {
+    let own = || f64::from(height(hash::finish_high(hash::absorb(hash, 1))));
+    match corner {
+        Corner::Gradient => (0.0, super::gradient::gradient_of(hash)),
+        Corner::Value => (f64::from(height(hash)), [0.0; 3]),
+        Corner::ValueGradient => (own(), super::gradient::gradient_of(hash)),
+    }
+}
+
 /// ξ₀ from a hash, in [−1, 1), a multiple of 2⁻²³.
 #[inline(always)]
 #[expect(

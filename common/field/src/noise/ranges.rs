@@ -1,4 +1,4 @@
-//! What a noise can be over a box of its coordinates: its value midway, and its steepest slope on either side.
+//! What a noise's gradient can be over a box of its coordinates: its value midway, and its steepest change on either side.
 
 use super::gradient::split;
 use super::kind::Noise;
@@ -8,20 +8,9 @@ use crate::interval::Interval;
 const FAR: f64 = 1e15;
 
 impl Noise {
-    /// All values over a box of coordinates, skewed ones if the noise is skewed; rounding included.
+    /// All components of the gradient over a box of coordinates, skewed ones if the noise is skewed.
     ///
-    /// Skewed coordinates are never nearer to each other than the places they stand for, so the slope by places holds.
-    pub(crate) fn over(&self, spans: [Interval; 3]) -> Interval {
-        let Some((middle, reach)) = middle(spans) else {
-            return self.range();
-        };
-        let [(x, u), (y, v), (z, w)] = middle.map(split);
-        let value = f64::from(self.value([x, y, z], [u, v, w]));
-        let room = self.slope() * reach + 2.0 * self.rounding();
-        Interval::point(value).expand(room).meet(self.range())
-    }
-
-    /// All components of the gradient over a box of such coordinates.
+    /// Skewed coordinates are never nearer to each other than the places they stand for, so the bound by places holds.
     pub(crate) fn slopes_over(&self, spans: [Interval; 3]) -> [Interval; 3] {
         let steepest = self.slope() + self.slope_rounding();
         let all = Interval::new(-steepest, steepest).widen();

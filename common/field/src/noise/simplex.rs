@@ -12,7 +12,7 @@ use super::lattice::slope;
 use crate::hash;
 
 /// Brings the greatest value close to 1: the supremum of the plain sum over all gradients is 0.013007.
-const SCALE: f32 = 76.0;
+pub(crate) const SCALE: f32 = 76.0;
 
 /// No value is farther from zero.
 pub const RANGE: f64 = 1.0;
@@ -76,7 +76,7 @@ pub(crate) fn at<R: Real>(lattice: Lattice, cell: [u32; 3], offset: [f32; 3]) ->
 }
 
 #[inline(always)]
-fn corner(lattice: Lattice, [x, y, z]: [u32; 3]) -> u32 {
+pub(crate) fn corner(lattice: Lattice, [x, y, z]: [u32; 3]) -> u32 {
     let row = hash::absorb(hash::absorb(lattice.start(), x), y);
     hash::finish_high(hash::absorb(row, z))
 }

@@ -13,7 +13,7 @@ use super::node::{NEAR, cell_state, draw, fraction, gap, neighbour};
 pub const NODES_MAX: f64 = 8.0;
 
 /// √3: the greatest height, of a uniform distribution of variance 1.
-pub(super) const HEIGHT: f32 = 1.732_050_8;
+pub(crate) const HEIGHT: f32 = 1.732_050_8;
 
 /// The radial profile of a node.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -97,7 +97,7 @@ impl Kernel {
     }
 
     /// The most that |h′| is anywhere.
-    pub(super) fn steepest(self) -> f64 {
+    pub(crate) fn steepest(self) -> f64 {
         match self {
             Self::Lewis => core::f64::consts::FRAC_PI_2 * (1.0 + 1e-12),
             Self::Quintic => 1.875,

@@ -35,7 +35,7 @@ impl Spot {
     }
 
     /// How many times a kernel can be steeper than the plain one.
-    fn squeeze(&self) -> f64 {
+    pub(crate) fn squeeze(&self) -> f64 {
         f64::from(self.stretch) / (1.0 - f64::from(self.variety))
     }
 
@@ -91,6 +91,13 @@ impl Spot {
             }
         }
         total
+    }
+
+    /// The axis and the radius of a spot.
+    pub(crate) fn form(&self, state: u32, index: u32) -> ([f64; 3], f64) {
+        let axis = self.axis.unwrap_or_else(|| direction(state, index));
+        let radius = 1.0 - self.variety * fraction(draw(state, index, 6));
+        (axis.map(f64::from), f64::from(radius))
     }
 
     /// The squared distance from a spot's node in units of the spot: 1 at its border.

@@ -110,6 +110,11 @@ pub(crate) fn at<R: Real>(lattice: Lattice, cell: [u32; 3], offset: [f32; 3]) ->
     total
 }
 
+/// The coefficient of a cell's B-spline.
+pub(crate) fn coefficient_of(lattice: Lattice, cell: [u32; 3]) -> f64 {
+    f64::from(coefficient(Tile::shared(), lattice, cell))
+}
+
 /// The coefficient of a cell: its block's part of the tile.
 #[inline(always)]
 fn coefficient(tile: &Tile, lattice: Lattice, cell: [u32; 3]) -> f32 {

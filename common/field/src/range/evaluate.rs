@@ -332,6 +332,13 @@ impl Program {
         segment.ground(&t).first(&self.plan)
     }
 
+    /// The same of the exact field alone: noises are not rounded to f32, as evaluation rounds them. A reference.
+    pub fn along_exact(&self, segment: &Segment) -> Slope<1> {
+        let t = Slope::<1, true>::of_variables(segment.t, [1.0]);
+        let Slope { value, slopes } = segment.ground(&t).first(&self.plan);
+        Slope { value, slopes }
+    }
+
     /// The first root along a segment as a standard affine form, condensed to the ray's symbol (thesis §5.3.2).
     pub fn along_affine(&self, segment: &Segment) -> Reduced<1> {
         let t = Affine::from_reduced(&segment.form());

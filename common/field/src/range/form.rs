@@ -46,6 +46,9 @@ fn between<F: Form>(a: &F, b: &F) -> F {
 }
 
 /// Thesis eq. (5.28), with `sign` −1 for the smaller and 1 for the larger.
+///
+/// Half of the sum and half of the difference share all symbols. Joined here in one step they keep them, so that reduced
+/// forms lose nothing against standard ones inside a minimum, as they do in thesis §5.4.2.
 fn extreme<F: Form>(a: &F, b: &F, sign: f64) -> F {
     let difference = a.added(b, -1.0);
     let apart = difference.span();
@@ -55,17 +58,76 @@ fn extreme<F: Form>(a: &F, b: &F, sign: f64) -> F {
     if apart.high <= 0.0 {
         return if sign < 0.0 { a.clone() } else { b.clone() };
     }
-    let half = Band {
-        alpha: 0.5,
+    let Some(Band { alpha, beta, delta }) = Function::Unary(Unary::Abs).band(apart) else {
+        let (p, q) = (a.span(), b.span());
+        return F::somewhere(if sign < 0.0 { p.min(q) } else { p.max(q) });
+    };
+    // |a − b| ∈ α(a − b) + β ± δ: the result is a mean of the two, and takes from each no more doubt than its share.
+    let share = |toward: f64| 0.5 * (1.0 + sign * toward);
+    let first = a.banded(Band {
+        alpha: share(alpha),
+        beta: sign * 0.5 * beta,
+        delta: 0.5 * delta,
+    });
+    let second = b.banded(Band {
+        alpha: share(-alpha),
         beta: 0.0,
         delta: 0.0,
-    };
-    let sum = a.added(b, 1.0);
-    let result = sum
-        .added(&of(&difference, Function::Unary(Unary::Abs)), sign)
-        .banded(half);
+    });
+    let result = first.added(&second, 1.0);
     let (p, q) = (a.span(), b.span());
     held(result, if sign < 0.0 { p.min(q) } else { p.max(q) })
+}
+
+/// ‖v‖ as the line n·v, n the direction midway, and what v has across it: ‖v‖ − n·v lies between 0 and ‖v across n‖²/(2 n·v).
+///
+/// Along a ray that is half as wide as the root of a sum of squares, and a point towards the node. `None` where v may be 0 or turn far.
+fn length<F: Form>(v: &[F; 3]) -> Option<F> {
+    let middle = v.each_ref().map(|part| {
+        let span = part.span();
+        0.5 * (span.low + span.high)
+    });
+    let size = crate::arithmetic::length(middle);
+    let n = middle.map(|part| part / size);
+    let other = if n[0].abs() < 0.6 { 0 } else { 1 };
+    // Across n and the axis that it is farthest from.
+    let [x, y, z] = n;
+    let b = if other == 0 {
+        [0.0, z, -y]
+    } else {
+        [-z, 0.0, x]
+    };
+    let b_size = crate::arithmetic::length(b);
+    let b = b.map(|part| part / b_size);
+    let c = [
+        y * b[2] - z * b[1],
+        z * b[0] - x * b[2],
+        x * b[1] - y * b[0],
+    ];
+    let dot = |e: [f64; 3]| {
+        let scaled = |k: usize| {
+            v[k].banded(Band {
+                alpha: e[k],
+                beta: 0.0,
+                delta: 0.0,
+            })
+        };
+        scaled(0).added(&scaled(1), 1.0).added(&scaled(2), 1.0)
+    };
+    let line = dot(n);
+    let (p, q) = (dot(b).span().magnitude(), dot(c).span().magnitude());
+    let span = line.span();
+    let bulge = (p * p + q * q) / (2.0 * span.low);
+    let near = span.low > 0.0 && bulge < 0.25 * span.low;
+    near.then(|| {
+        // n, b and c are orthonormal to a few units in the last place.
+        let room = 32.0 * f64::EPSILON * (span.high + p + q);
+        line.banded(Band {
+            alpha: 1.0,
+            beta: 0.5 * bulge,
+            delta: 0.5 * bulge * (1.0 + ROUNDING) + room,
+        })
+    })
 }
 
 fn of<F: Form>(form: &F, function: Function) -> F {
@@ -190,6 +252,13 @@ impl<F: Form> Arithmetic for F {
             Function::Power(1.0) => self,
             _ => of(&self, function),
         }
+    }
+
+    fn distance(v: [Self; 3]) -> Self {
+        length(&v).unwrap_or_else(|| {
+            let [x, y, z] = v;
+            x.square().plus(y.square()).plus(z.square()).sqrt()
+        })
     }
 
     fn curve(self, curve: &Curve) -> Self {

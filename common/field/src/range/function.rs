@@ -6,6 +6,7 @@
 
 use crate::arithmetic::{self, Unary};
 use crate::interval::{Interval, larger, smaller};
+use crate::range::profile::Profile;
 
 /// A function of one number.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -27,6 +28,8 @@ pub(crate) enum Function {
     /// 1 − 6|t|⁵ + 15t⁴ − 10|t|³ for |t| < 1, else 0: the profile of lattice noises, thesis fig. 4.4
     /// (row 1973 of ERRATA: the quintic, not the cubic).
     Quintic,
+    /// A profile of another noise's kernel.
+    Profile(Profile),
 }
 
 /// Places where a function's derivative is a given number: at most this many within one turn of a circle.
@@ -87,6 +90,7 @@ impl Function {
             Self::Square => a * a,
             Self::Reciprocal => 1.0 / a,
             Self::OntoSphere(radius) => arithmetic::onto_sphere(radius, a),
+            Self::Profile(profile) => profile.value(a),
             Self::Quintic => {
                 let t = a.abs();
                 if t < 1.0 {
@@ -110,6 +114,7 @@ impl Function {
             Self::Clamp => f64::from(u8::from((0.0..=1.0).contains(&a))),
             Self::Square => 2.0 * a,
             Self::Reciprocal => -1.0 / (a * a),
+            Self::Profile(profile) => profile.slope(a),
             Self::OntoSphere(radius) => {
                 let inverse = arithmetic::inverse(a);
                 -radius * inverse * inverse
@@ -151,6 +156,7 @@ impl Function {
             }
             Self::Square => 2.0,
             Self::Reciprocal => 2.0 / (a * a * a),
+            Self::Profile(profile) => profile.bend(a),
             Self::OntoSphere(radius) => {
                 let inverse = arithmetic::inverse(a);
                 2.0 * radius * inverse * inverse * inverse
@@ -184,6 +190,15 @@ impl Function {
         if a.low.is_nan() || a.high.is_nan() {
             return Interval::ALL;
         }
+        if let Self::Profile(profile) = self {
+            return profile.image(a);
+        }
+        if self == Self::Quintic {
+            // It falls from 0 on, on both sides.
+            let far = a.abs();
+            let image = Interval::new(self.value(far.high), self.value(far.low));
+            return image.expand(self.slack());
+        }
         let (low, high) = self.extremes(0.0, a);
         let image = Interval::new(low, high).expand(self.slack());
         match self {
@@ -199,6 +214,14 @@ impl Function {
     /// All derivatives over `a`, rounded outward: of both sides where it has a corner.
     pub(crate) fn slopes(self, a: Interval) -> Interval {
         let Interval { low, high } = a;
+        if let Self::Profile(profile) = self {
+            let known = !low.is_nan() && !high.is_nan();
+            return if known {
+                profile.slopes(a)
+            } else {
+                Interval::ALL
+            };
+        }
         // The derivatives at the ends, at the turning points of φ′ within, and on both sides of its corners.
         let turning: &[f64] = match self {
             Self::Unary(Unary::Neg) => return Interval::point(-1.0),
@@ -249,6 +272,7 @@ impl Function {
                 };
                 return rest.mul(Interval::point(exponent));
             }
+            Self::Profile(_) => &[],
             Self::SmoothStep(from, to) => &[0.5 * (from + to)],
             Self::Quintic => &[-1.0, -0.5, 0.0, 0.5, 1.0],
         };
@@ -272,6 +296,9 @@ impl Function {
 
     /// The line that the function stays closest to over `a`, through the slope of its chord, and how close; `None` if there is none.
     pub(crate) fn band(self, a: Interval) -> Option<Band> {
+        if let Self::Profile(profile) = self {
+            return profile.band(a);
+        }
         let broken = match self {
             Self::Reciprocal => a.low <= 0.0 && a.high >= 0.0,
             Self::OntoSphere(_) => a.low <= 0.0,
@@ -325,7 +352,7 @@ impl Function {
     fn level(self, alpha: f64, a: Interval) -> Places {
         let none = Places::none();
         match self {
-            Self::Unary(Unary::Neg) => none,
+            Self::Unary(Unary::Neg) | Self::Profile(_) => none,
             Self::Unary(Unary::Abs) => none.and(0.0),
             Self::Unary(Unary::Sqrt) => none.and(0.0).and(0.25 / (alpha * alpha)),
             Self::Unary(Unary::Exp) => none.and(libm::log(alpha)),

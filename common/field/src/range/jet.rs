@@ -9,8 +9,9 @@ use crate::interval::Interval;
 use crate::noise::jet::Jet2;
 use crate::noise::{self, Lattice, Noise};
 use crate::number::Number;
+use crate::range::Arithmetic;
 use crate::range::function::Function;
-use crate::range::{Arithmetic, lattice};
+use crate::range::noise::lattice::gradient_noise;
 use crate::shape::{Local, Shape};
 
 /// A value, its gradient and its Hessian by the three coordinates.
@@ -213,7 +214,7 @@ impl Arithmetic for Jet {
     /// The value is that of evaluation to the bit; the derivatives are exact to f64.
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
         let value = f64::noise(lattice, at.map(|part| part.value));
-        let exact = lattice::gradient_noise(lattice, at);
+        let exact = gradient_noise(lattice, at);
         Self { value, ..exact }
     }
 

@@ -28,8 +28,9 @@ pub(crate) mod function;
 mod grid;
 mod interval;
 mod jet;
-mod lattice;
+pub(crate) mod noise;
 mod points;
+pub(crate) mod profile;
 mod reduced;
 mod slope;
 
@@ -64,6 +65,11 @@ pub(crate) trait Arithmetic: Number {
     /// The same number, with room for an error; at a point, the same.
     fn blurred(self, error: f64) -> Self;
 
+    /// The same number, with room for how far what is computed in f32 may be from it.
+    fn computed(self, error: f64) -> Self {
+        self.blurred(error)
+    }
+
     /// Any number between the two; a point arithmetic is never asked and answers the first.
     fn hull(self, other: Self) -> Self;
 
@@ -86,7 +92,7 @@ pub(crate) trait Arithmetic: Number {
 
     /// Gradient noise at a place, thesis eq. (4.9).
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
-        lattice::gradient_noise(lattice, at)
+        noise::lattice::gradient_noise(lattice, at)
     }
 
     /// A discrete surface at a place.
@@ -94,15 +100,18 @@ pub(crate) trait Arithmetic: Number {
         grid::mean_value(surface, at)
     }
 
-    /// Any other noise, by skewed coordinates if it is skewed: its value midway, and its steepest slope on either side.
-    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
-        Self::any(noise.over(at.each_ref().map(Self::range)))
+    /// The Euclidean length of a vector.
+    fn distance([x, y, z]: [Self; 3]) -> Self {
+        x.square().plus(y.square()).plus(z.square()).sqrt()
     }
 
-    /// The gradient of a noise, by skewed coordinates if it is skewed.
+    /// Any other noise, by skewed coordinates if it is skewed.
+    fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
+        noise::any(noise, at)
+    }
+
+    /// The gradient of a noise, by skewed coordinates if it is skewed: what its kernels' slopes say of it.
     fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
-        noise
-            .slopes_over(at.each_ref().map(Self::range))
-            .map(Self::any)
+        slope::slopes_over(noise, at.each_ref().map(Self::range)).map(Self::any)
     }
 }

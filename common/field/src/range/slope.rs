@@ -12,18 +12,21 @@ use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::Function;
 use crate::range::interval::curve_over;
+use crate::range::noise;
 use crate::shape::Shape;
 
 /// All values of a function over a region, and all of its derivatives by `N` variables.
+///
+/// `EXACT` ones hold the exact field alone, without room for the f32 that noises are computed in: a reference.
 #[derive(Clone, Copy, PartialEq, Debug)]
-pub struct Slope<const N: usize> {
+pub struct Slope<const N: usize, const EXACT: bool = false> {
     /// The values.
     pub value: Interval,
     /// The derivatives.
     pub slopes: [Interval; N],
 }
 
-impl<const N: usize> Slope<N> {
+impl<const N: usize, const EXACT: bool> Slope<N, EXACT> {
     /// Values over a region through which variable `i` runs at a rate of `rates[i]` per unit.
     pub const fn of_variables(value: Interval, rates: [f64; N]) -> Self {
         let mut slopes = [Interval::point(0.0); N];
@@ -56,7 +59,7 @@ impl<const N: usize> Slope<N> {
     }
 }
 
-impl<const N: usize> Number for Slope<N> {
+impl<const N: usize, const EXACT: bool> Number for Slope<N, EXACT> {
     fn constant(value: f64) -> Self {
         Self::of_variables(Interval::point(value), [0.0; N])
     }
@@ -135,7 +138,7 @@ impl<const N: usize> Number for Slope<N> {
     }
 }
 
-impl<const N: usize> Arithmetic for Slope<N> {
+impl<const N: usize, const EXACT: bool> Arithmetic for Slope<N, EXACT> {
     fn any(range: Interval) -> Self {
         Self {
             value: range,
@@ -159,6 +162,10 @@ impl<const N: usize> Arithmetic for Slope<N> {
             value: self.value.expand(error),
             ..self
         }
+    }
+
+    fn computed(self, error: f64) -> Self {
+        if EXACT { self } else { self.blurred(error) }
     }
 
     fn hull(self, other: Self) -> Self {
@@ -204,23 +211,48 @@ impl<const N: usize> Arithmetic for Slope<N> {
     }
 
     fn any_noise(noise: &Noise, at: [Self; 3]) -> Self {
-        let value = noise.over(at.each_ref().map(Self::range));
-        composed(value, noise.slope() + noise.slope_rounding(), &at)
+        let mut result = noise::any(noise, at);
+        let (steepest, rough) = (noise.slope(), noise.slope_rounding());
+        let rough = if EXACT { 0.0 } else { rough };
+        for (i, slope) in result.slopes.iter_mut().enumerate() {
+            let rates = at.each_ref().map(|part| part.slopes[i].magnitude());
+            // An f32 gradient's components are each that far from the exact ones.
+            *slope = within(*slope, steepest, &rates).expand(rough * rates.iter().sum::<f64>());
+        }
+        result
     }
 
     fn noise_slopes(noise: &Noise, at: [Self; 3]) -> [Self; 3] {
-        let values = noise.slopes_over(at.each_ref().map(Self::range));
-        values.map(|value| composed(value, noise.bend(), &at))
+        let bend = noise.bend();
+        slopes_over(noise, at.each_ref().map(Self::range)).map(|value| Self {
+            value,
+            slopes: std::array::from_fn(|i| {
+                let rates = at.each_ref().map(|part| part.slopes[i].magnitude());
+                within(Interval::ALL, bend, &rates)
+            }),
+        })
     }
 }
 
-/// A function of three numbers that is nowhere steeper than `steepest`.
-fn composed<const N: usize>(value: Interval, steepest: f64, at: &[Slope<N>; 3]) -> Slope<N> {
-    let mut slopes = [Interval::point(0.0); N];
-    for (i, slope) in slopes.iter_mut().enumerate() {
-        let [x, y, z] = at.each_ref().map(|part| part.slopes[i].magnitude());
-        let most = steepest * (x * x + y * y + z * z).sqrt();
-        *slope = Interval::new(-most, most).widen();
+/// What of some slopes along a way at these rates a function can have that is nowhere steeper than `steepest`.
+fn within(slopes: Interval, steepest: f64, [x, y, z]: &[f64; 3]) -> Interval {
+    let most = steepest * (x * x + y * y + z * z).sqrt();
+    if most.is_finite() {
+        slopes.meet(Interval::new(-most, most).widen())
+    } else {
+        slopes
     }
-    Slope { value, slopes }
+}
+
+/// All components of a noise's gradient over a box of its coordinates: those of its kernels, or, if that says less,
+/// the gradient midway and its steepest change on either side.
+pub(super) fn slopes_over(noise: &Noise, spans: [Interval; 3]) -> [Interval; 3] {
+    let at = [0, 1, 2].map(|axis| {
+        let mut rates = [0.0; 3];
+        rates[axis] = 1.0;
+        Slope::<3>::of_variables(spans[axis], rates)
+    });
+    let kernels = Slope::<3>::any_noise(noise, at).slopes;
+    let midway = noise.slopes_over(spans);
+    [0, 1, 2].map(|axis| midway[axis].meet(kernels[axis]))
 }

@@ -1,10 +1,13 @@
 //! The conformance suite of all arithmetics: what a range says holds at every point of it; derivatives are those of differences.
 
 use super::function::Function;
+use super::profile::Profile;
 use super::{Affine, Arithmetic, Cell, Jet, Place, Reduced, Segment, Slope};
 use crate::arithmetic::{Binary, Unary};
+use crate::curve::{Curve, Join};
 use crate::hash::{hash, unit};
 use crate::interval::Interval;
+use crate::noise::sparse::Kernel;
 use crate::number::Number;
 use crate::program::tests::{noise_zoo, zoo};
 use crate::{Points, Program, Scratch, SimdLevel};
@@ -48,7 +51,18 @@ fn functions() -> Vec<Function> {
         Function::OntoSphere(2.0),
         Function::Quintic,
     ]);
+    all.extend(profiles().map(Function::Profile));
     all
+}
+
+fn profiles() -> [Profile; 5] {
+    let [a, b, c] = Kernel::ALL.map(Profile::Radial);
+    [a, b, c, Profile::Simplex, Profile::Spline]
+}
+
+/// Whether no number below 0 is ever asked for.
+fn of_squares(function: Function) -> bool {
+    matches!(function, Function::Profile(profile) if profile != Profile::Spline)
 }
 
 #[test]
@@ -58,6 +72,12 @@ fn functions_stay_within_image_band_and_slopes() {
         for i in 0..6_000 {
             let centre = 4.0 * number(&[k, i, 0]);
             let half = scale(&[k, i, 1]);
+            // Squared distances: half of them beyond the kernel; a range may begin a little below 0, as rounding leaves it.
+            let centre = if of_squares(function) {
+                0.5 * centre.abs() + 0.99 * half
+            } else {
+                centre
+            };
             let over = Interval::new(centre - half, centre + half);
             let (image, slopes, band) = (
                 function.image(over),
@@ -69,6 +89,9 @@ fn functions_stay_within_image_band_and_slopes() {
             for j in 0..=8 {
                 let a = over.low + f64::from(j) / 8.0 * over.width();
                 let a = if a > over.high { over.high } else { a };
+                if of_squares(function) && a < 0.0 {
+                    continue;
+                }
                 let value = function.value(a);
                 let told = format!("{function:?} at {a} of {over:?}: {value}");
                 assert!(image.contains(value), "{told} outside {image:?}");
@@ -100,6 +123,9 @@ fn bands_are_no_wider_than_the_function_bends() {
         for i in 0..200 {
             let a = 0.2 + 0.6 * unit(hash(&[i, 9]));
             let half = 1e-3;
+            if function == Function::Profile(Profile::Spline) && (a - 0.5).abs() < 2.0 * half {
+                continue;
+            }
             let band = function.band(Interval::new(a - half, a + half)).unwrap();
             let bend = function.bend(a).abs();
             let most = 0.26 * half * half * (bend * 1.1 + 0.1) + 3e-14;
@@ -113,8 +139,12 @@ fn derivatives_of_functions_are_those_of_differences() {
     for function in functions() {
         for i in 0..500 {
             let a = 3.0 * number(&[i, 5]);
+            let a = if of_squares(function) { a.abs() } else { a };
             let near = |x: f64| (a - x).abs() < 0.02;
-            if [-1.0, 0.0, 1.0, 2.5].into_iter().any(near) {
+            if [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.5]
+                .into_iter()
+                .any(near)
+            {
                 continue;
             }
             let h = 1e-5;
@@ -137,10 +167,10 @@ fn holds<const N: usize>(form: &Reduced<N>, e: [f64; N], value: f64) -> bool {
 }
 
 /// Chains of random operations on a few numbers of two shared symbols; at each, all arithmetics against points.
-#[test]
-fn chains_of_operations_hold_their_points() {
+fn chains(count: u32) {
     const E: usize = 3;
-    for i in 0..12_000u32 {
+    let curve = Curve::new(Join::Smooth, &[-2.0, 1.0, 0.0, 3.0, 1.0, 2.5, 4.0, -2.0]);
+    for i in 0..count {
         let e: [f64; E] = [0, 1, 2].map(|k| number(&[i, k, 77]));
         let size = scale(&[i, 78]);
         let start = |k: u32| {
@@ -161,7 +191,8 @@ fn chains_of_operations_hold_their_points() {
         for step in 0..12u32 {
             let pick = |k: u32| hash(&[i, step, k]) as usize % 3;
             let (a, b, c, to) = (pick(0), pick(1), pick(2), pick(3));
-            let kind = hash(&[i, step, 4]) % 18;
+            let kind = hash(&[i, step, 4]) % 24;
+            let profile = Function::Profile(profiles()[pick(5) + usize::from(pick(6) == 0)]);
             macro_rules! act {
                 ($list:ident) => {{
                     let [x, y, z] = [a, b, c].map(|k| $list[k].clone());
@@ -173,6 +204,12 @@ fn chains_of_operations_hold_their_points() {
                         14 => x.square(),
                         15 => x.power(0.7),
                         16 => x.apply(Function::Quintic),
+                        17 => Arithmetic::distance([x, y, z]),
+                        18 => x.apply(Function::SmoothStep(-1.0, 2.5)),
+                        19 => x.curve(&curve),
+                        20 => x.square().apply(profile),
+                        21 => x.apply(Function::Profile(Profile::Spline)),
+                        22 => x.square().sqrt().apply(Function::OntoSphere(2.0)).mul(y),
                         _ => x.times(-0.37).plus(y),
                     };
                     $list[to] = result;
@@ -198,6 +235,17 @@ fn chains_of_operations_hold_their_points() {
             }
         }
     }
+}
+
+#[test]
+fn chains_of_operations_hold_their_points() {
+    chains(12_000);
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn a_million_operations_hold_their_points() {
+    chains(300_000);
 }
 
 /// Calls with random segments, long and short, and some of their places with t in [−1, 1] of the segment.
@@ -251,53 +299,107 @@ fn over_segments(count: u32, mut check: impl FnMut(&Segment, &[(f64, Place)])) {
     }
 }
 
+/// How wide ranges are along short segments, by intervals and by affine forms; adds nothing where they say nothing.
+#[derive(Default)]
+struct Widths {
+    intervals: f64,
+    forms: f64,
+}
+
+/// Every arithmetic against points along `count` segments of a field.
+fn along(name: &str, program: &Program, count: u32) -> Widths {
+    let mut widths = Widths::default();
+    over_segments(count, |segment, places| {
+        let interval = program.along_interval(segment);
+        let reduced = program.along_reduced(segment);
+        let affine = program.along_affine(segment);
+        let slope = program.along_slope(segment);
+        for (e, place) in places {
+            let value = program.at(place);
+            let told = || format!("{name} at {place:?} of {segment:?}: {value}");
+            assert!(interval.contains(value), "{}: {interval:?}", told());
+            assert!(slope.value.contains(value), "{}: {slope:?}", told());
+            // e is good to the rounding of the segment's middle.
+            let blur = 1e-14 / segment.t.width() * reduced.along[0].abs();
+            assert!(
+                holds(&reduced.blurred(blur), [*e], value),
+                "{}: {reduced:?}",
+                told()
+            );
+            let blur = 1e-14 / segment.t.width() * affine.along[0].abs();
+            assert!(
+                holds(&affine.blurred(blur), [*e], value),
+                "{}: {affine:?}",
+                told()
+            );
+        }
+        let short = segment.t.width() < 0.02 && segment.t.width() > 1e-3;
+        if short && interval.magnitude() < 100.0 && reduced.error < 100.0 {
+            widths.intervals += interval.width();
+            widths.forms += reduced.interval().width();
+        }
+    });
+    widths
+}
+
 #[test]
 fn every_field_stays_within_its_ranges_along_segments() {
-    let (mut spans, mut forms) = (0.0, 0.0);
-    // Most shapes are known by their bounds alone, and those are intervals; noises but gradient noise by their slopes.
+    // Most shapes are known by their bounds alone, and those are intervals.
     let shapes: Vec<String> = crate::shape::tests::zoo()
         .into_iter()
         .map(|(name, ..)| name)
-        .chain(noise_zoo().into_iter().map(|(name, _)| name))
         .collect();
-    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
-        let bounded_alone = shapes.contains(&name);
-        over_segments(500, |segment, places| {
-            let interval = program.along_interval(segment);
-            let reduced = program.along_reduced(segment);
-            let affine = program.along_affine(segment);
-            let slope = program.along_slope(segment);
-            for (e, place) in places {
-                let value = program.at(place);
-                let told = || format!("{name} at {place:?} of {segment:?}: {value}");
-                assert!(interval.contains(value), "{}: {interval:?}", told());
-                assert!(slope.value.contains(value), "{}: {slope:?}", told());
-                // e is good to the rounding of the segment's middle.
-                let blur = 1e-14 / segment.t.width() * reduced.along[0].abs();
-                assert!(
-                    holds(&reduced.blurred(blur), [*e], value),
-                    "{}: {reduced:?}",
-                    told()
-                );
-                let blur = 1e-14 / segment.t.width() * affine.along[0].abs();
-                assert!(
-                    holds(&affine.blurred(blur), [*e], value),
-                    "{}: {affine:?}",
-                    told()
-                );
-            }
-            if !bounded_alone
-                && segment.t.width() < 0.02
-                && interval.magnitude() < 100.0
-                && reduced.error < 100.0
-            {
-                spans += interval.width();
-                forms += reduced.interval().width();
-            }
-        });
+    let mut sum = Widths::default();
+    for (name, program) in zoo() {
+        let widths = along(&name, &program, 500);
+        if !shapes.contains(&name) {
+            sum.intervals += widths.intervals;
+            sum.forms += widths.forms;
+        }
     }
     // Along short segments correlation is worth more than half of the width.
-    assert!(forms < 0.5 * spans, "affine {forms}, intervals {spans}");
+    let Widths { intervals, forms } = sum;
+    assert!(
+        forms < 0.5 * intervals,
+        "affine {forms}, intervals {intervals}"
+    );
+}
+
+#[test]
+fn every_noise_stays_within_its_ranges_along_segments() {
+    for (name, program) in noise_zoo() {
+        let Widths { intervals, forms } = along(&name, &program, 1_000);
+        // A gradient's components are known as intervals.
+        let correlated = !name.starts_with("gradient of");
+        assert!(
+            !correlated || forms < 0.7 * intervals,
+            "{name}: affine {forms}, intervals {intervals}"
+        );
+    }
+}
+
+/// Three million places of noises, by every arithmetic; half of one of everything else.
+#[test]
+#[ignore = "long: tests/run --all"]
+fn millions_of_places_stay_within_their_ranges() {
+    let long = |(name, program): &(String, Program), count| {
+        along(name, program, count);
+        over_cells(name, program, count / 8);
+    };
+    let (fields, noises) = (zoo(), noise_zoo());
+    std::thread::scope(|scope| {
+        for thread in 0..2 {
+            let (fields, noises) = (&fields, &noises);
+            scope.spawn(move || {
+                for field in noises.iter().skip(thread).step_by(2) {
+                    long(field, 20_000);
+                }
+                for field in fields.iter().skip(thread).step_by(2) {
+                    long(field, 1_500);
+                }
+            });
+        }
+    });
 }
 
 #[test]
@@ -337,45 +439,49 @@ fn slopes_along_segments_hold_every_chord() {
 #[test]
 fn every_field_stays_within_its_ranges_over_boxes_and_cells() {
     for (name, program) in zoo().into_iter().chain(noise_zoo()) {
-        for i in 0..250u32 {
-            let part = |k: u32| number(&[i, k, 41]);
-            let size = scale(&[i, 9, 41]);
-            let centre = [0, 1, 2].map(|k| 2.0 * part(k));
-            let edges = [0, 1, 2].map(|a| [0, 1, 2].map(|k| size * part(10 + 3 * a + k)));
-            let cell = Cell::of_edges(centre, edges);
-            let form = program.over_cell(&cell);
-            let reach = [0, 1, 2].map(|k| {
-                let half: f64 = edges.iter().map(|edge| edge[k].abs()).sum();
-                Interval::point(centre[k]).expand(half)
-            });
-            let zero = Interval::point(0.0);
-            let over = program.over_box(reach, zero, zero);
-            let slopes = program.slopes_over_box(reach, zero, 0.0);
-            for j in 0..8u32 {
-                let e = [0, 1, 2].map(|k| number(&[i, j, k, 42]));
-                let at = [0, 1, 2].map(|k| {
-                    centre[k] + e[0] * edges[0][k] + e[1] * edges[1][k] + e[2] * edges[2][k]
-                });
-                let place = Place {
-                    at,
-                    footprint: 0.0,
-                    time: 0.0,
-                };
-                let value = program.at(&place);
-                let told = || format!("{name} at {place:?} of {centre:?} {edges:?}: {value}");
-                assert!(over.contains(value), "{}: {over:?}", told());
-                assert!(slopes.value.contains(value), "{}: {slopes:?}", told());
-                let blur = 1e-14 / size * form.along.iter().map(|x| x.abs()).sum::<f64>();
-                assert!(holds(&form.blurred(blur), e, value), "{}: {form:?}", told());
-                let jet = program.jet(&place);
-                for (slope, exact) in slopes.slopes.iter().zip(jet.gradient) {
-                    let room = slope.expand(1e-9 * (1.0 + exact.abs()));
-                    assert!(
-                        !exact.is_finite() || room.contains(exact),
-                        "{}: {exact} outside {slope:?}",
-                        told()
-                    );
-                }
+        over_cells(&name, &program, 250);
+    }
+}
+
+/// Boxes, their slopes and cells of three symbols against points, `count` times.
+fn over_cells(name: &str, program: &Program, count: u32) {
+    for i in 0..count {
+        let part = |k: u32| number(&[i, k, 41]);
+        let size = scale(&[i, 9, 41]);
+        let centre = [0, 1, 2].map(|k| 2.0 * part(k));
+        let edges = [0, 1, 2].map(|a| [0, 1, 2].map(|k| size * part(10 + 3 * a + k)));
+        let cell = Cell::of_edges(centre, edges);
+        let form = program.over_cell(&cell);
+        let reach = [0, 1, 2].map(|k| {
+            let half: f64 = edges.iter().map(|edge| edge[k].abs()).sum();
+            Interval::point(centre[k]).expand(half)
+        });
+        let zero = Interval::point(0.0);
+        let over = program.over_box(reach, zero, zero);
+        let slopes = program.slopes_over_box(reach, zero, 0.0);
+        for j in 0..8u32 {
+            let e = [0, 1, 2].map(|k| number(&[i, j, k, 42]));
+            let at = [0, 1, 2]
+                .map(|k| centre[k] + e[0] * edges[0][k] + e[1] * edges[1][k] + e[2] * edges[2][k]);
+            let place = Place {
+                at,
+                footprint: 0.0,
+                time: 0.0,
+            };
+            let value = program.at(&place);
+            let told = || format!("{name} at {place:?} of {centre:?} {edges:?}: {value}");
+            assert!(over.contains(value), "{}: {over:?}", told());
+            assert!(slopes.value.contains(value), "{}: {slopes:?}", told());
+            let blur = 1e-14 / size * form.along.iter().map(|x| x.abs()).sum::<f64>();
+            assert!(holds(&form.blurred(blur), e, value), "{}: {form:?}", told());
+            let jet = program.jet(&place);
+            for (slope, exact) in slopes.slopes.iter().zip(jet.gradient) {
+                let room = slope.expand(1e-9 * (1.0 + exact.abs()));
+                assert!(
+                    !exact.is_finite() || room.contains(exact),
+                    "{}: {exact} outside {slope:?}",
+                    told()
+                );
             }
         }
     }

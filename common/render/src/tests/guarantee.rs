@@ -3,13 +3,16 @@
 use core::sync::atomic::AtomicBool;
 
 use field::hash::{hash, unit};
-use field::{Points, Scratch, SimdLevel};
+use field::{Interval, Points, Scratch, SimdLevel};
 use glam::DVec3;
 
 use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
+use crate::trace::methods::tests::reference::truth;
+use crate::trace::methods::tests::surfaces::surfaces;
+use crate::trace::methods::{FieldAlong, Wanted};
 use crate::trace::{Goal, Hit, Ray, Surface, Tracer, bound};
 use crate::view::View;
 
@@ -20,54 +23,95 @@ fn scannable(mut scene: scene::Description) -> scene::Description {
     scene
 }
 
-/// Values of the field at every point of a ray's grid, until the first inside.
-fn scan(surface: &Surface, ray: &Ray) -> Hit {
-    let Some((start, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
-        return Hit::None;
-    };
-    let (first, last) = (ray.grid.first_from(start), ray.grid.first_from(end));
-    let value = |t: f64| {
-        let place = ray.origin + ray.direction * t;
-        let distance = {
-            let square = ray.from_eye.dot(ray.from_eye);
-            (square + t * (2.0 * ray.from_eye.dot(ray.direction) + t)).sqrt()
-        };
-        let mut value = [0.0];
+/// The field along a ray, as the search evaluates it.
+struct Values<'a> {
+    surface: &'a Surface,
+    ray: &'a Ray,
+    scratch: &'a mut Scratch,
+}
+
+impl Values<'_> {
+    /// Values and footprints at some distances.
+    fn at(&mut self, distances: &[f64]) -> (Vec<f64>, Vec<f64>) {
+        let Self {
+            surface,
+            ray,
+            scratch,
+        } = self;
+        let places: Vec<DVec3> = distances
+            .iter()
+            .map(|t| ray.origin + ray.direction * *t)
+            .collect();
+        let axis = |k: usize| places.iter().map(|p| p[k]).collect::<Vec<f64>>();
+        let footprint: Vec<f64> = distances
+            .iter()
+            .map(|t| {
+                let square = ray.from_eye.dot(ray.from_eye);
+                let along = t * (2.0 * ray.from_eye.dot(ray.direction) + t);
+                surface.footprint.at((square + along).sqrt())
+            })
+            .collect();
+        let mut values = vec![0.0; distances.len()];
         surface.program.evaluate(
             SimdLevel::scalar(),
             &Points {
-                x: &[place.x],
-                y: &[place.y],
-                z: &[place.z],
-                footprint: &[surface.footprint.at(distance)],
-                time: &[ray.time],
+                x: &axis(0),
+                y: &axis(1),
+                z: &axis(2),
+                footprint: &footprint,
+                time: &vec![ray.time; distances.len()],
             },
-            &mut Scratch::new(),
-            &mut [&mut value],
+            scratch,
+            &mut [&mut values],
         );
-        (value[0], surface.footprint.at(distance))
+        (values, footprint)
+    }
+
+    fn one(&mut self, t: f64) -> (f64, f64) {
+        let (values, footprint) = self.at(&[t]);
+        (values[0], footprint[0])
+    }
+}
+
+/// Values of the field at every point of a ray's grid, until the first inside.
+fn scan(surface: &Surface, ray: &Ray, scratch: &mut Scratch) -> Hit {
+    /// Points that are evaluated together.
+    const TOGETHER: i64 = 256;
+    let Some((start, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
+        return Hit::None;
     };
+    let mut values = Values {
+        surface,
+        ray,
+        scratch,
+    };
+    let (first, last) = (ray.grid.first_from(start), ray.grid.first_from(end));
     let within = |t: f64| bound::contains(&surface.bound, ray.origin + ray.direction * t);
-    for index in first..=last {
-        let far = ray.grid.place(index);
-        let (inside, _) = value(far);
-        if inside > 0.0 || !within(far) {
-            continue;
-        }
-        if index == 0 {
-            return Hit::Surface(far);
-        }
-        let near = ray.grid.place(index - 1);
-        let (outside, _) = value(near);
-        if !within(near) {
-            return Hit::Face(far);
-        }
-        let end = |t, value| End { t, value };
-        let mut bracket = Bracket::new(end(near, outside), end(far, inside));
-        loop {
-            let (middle, footprint) = value(bracket.middle);
-            if let Some(root) = bracket.narrow(middle, footprint) {
-                return Hit::Surface(root);
+    let mut begin = first;
+    while begin <= last {
+        let indices: Vec<i64> = (begin..=last.min(begin + TOGETHER - 1)).collect();
+        begin += TOGETHER;
+        let places: Vec<f64> = indices.iter().map(|index| ray.grid.place(*index)).collect();
+        let (here, _) = values.at(&places);
+        for ((index, far), inside) in indices.into_iter().zip(places).zip(here) {
+            if inside > 0.0 || !within(far) {
+                continue;
+            }
+            if index == 0 {
+                return Hit::Surface(far);
+            }
+            let near = ray.grid.place(index - 1);
+            let (outside, _) = values.one(near);
+            if !within(near) {
+                return Hit::Face(far);
+            }
+            let end = |t, value| End { t, value };
+            let mut bracket = Bracket::new(end(near, outside), end(far, inside));
+            loop {
+                let (middle, footprint) = values.one(bracket.middle);
+                if let Some(root) = bracket.narrow(middle, footprint) {
+                    return Hit::Surface(root);
+                }
             }
         }
     }
@@ -109,24 +153,136 @@ fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
     (hits, counts)
 }
 
-#[test]
-fn the_search_finds_what_a_scan_finds() {
+/// Traces `count` rays at every scene and scans their grids.
+fn searched_and_scanned(count: u32) {
     for (name, scene) in scenes::all() {
         let scene = scannable(scene);
         let view = View::new(&scene.camera, &scene.film, 0.0);
         let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
-        let rays = rays(&surface, &view, 60);
+        let rays = rays(&surface, &view, count);
         let (hits, counts) = trace(&surface, Goal::Distance, &rays);
+        let mut scratch = Scratch::new();
         for (ray, hit) in rays.iter().zip(&hits) {
-            assert_eq!(*hit, scan(&surface, ray), "{name}: {ray:?}");
+            assert_eq!(*hit, scan(&surface, ray, &mut scratch), "{name}: {ray:?}");
         }
         assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
-        let per_ray = counts.steps / 60;
+        let per_ray = counts.steps / u64::from(count);
         assert!(
             per_ray < 400,
             "{name} took {per_ray} steps a ray: nothing is proven"
         );
     }
+}
+
+#[test]
+fn the_search_finds_what_a_scan_finds() {
+    searched_and_scanned(60);
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn the_search_finds_what_a_scan_finds_along_10_000_rays() {
+    searched_and_scanned(10_000);
+}
+
+/// The renderer's tracer at the surfaces that all methods are tried on, against the same reference.
+///
+/// A hit is the first grid point inside: a stretch of the solid that is longer than a gap of the grid must be met, and what is
+/// met must be a root, or a place where the field is within its rounding of 0.
+fn held_against_the_reference(count: u32) {
+    /// Rays that lie next to each other: a bundle.
+    const BUNDLE: u32 = 64;
+    for reference in surfaces() {
+        // With distance, cascades lose detail that the reference has.
+        let Some((graph, root)) = &reference.plain else {
+            continue;
+        };
+        let mut scene = scenes::orthographic(graph.clone(), *root, 3.0);
+        scene.film.resolution.width = 400;
+        scene.film.resolution.height = 400;
+        scene.film.window = scene.film.resolution.rect();
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let random = |ray: u32, dimension: u32| unit(hash(&[ray, dimension, 98]));
+        let rays: Vec<Ray> = (0..count)
+            .map(|index| {
+                let patch = index / BUNDLE;
+                let place = [0, 1].map(|axis| {
+                    let within = f64::from((index >> (3 * axis)) & 7) + random(index, axis);
+                    395.0 * random(patch, 10 + axis) + within
+                });
+                let sight = view.sight(&Sample {
+                    place,
+                    instant: 0.0,
+                });
+                Ray {
+                    origin: sight.origin,
+                    direction: sight.direction,
+                    from_eye: DVec3::ZERO,
+                    time: sight.time,
+                    grid: surface.sight,
+                }
+            })
+            .collect();
+        let (hits, _) = trace(&surface, Goal::Distance, &rays);
+        let footprint = surface.footprint.base;
+        let mut met = 0;
+        for (ray, hit) in rays.iter().zip(&hits) {
+            let Some((start, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
+                assert_eq!(*hit, Hit::None);
+                continue;
+            };
+            let along = FieldAlong {
+                program: &reference.program,
+                origin: ray.origin.into(),
+                direction: ray.direction.into(),
+                time: 0.0,
+            };
+            let truth = truth(
+                &along,
+                Interval::new(start, end),
+                reference.finest,
+                Wanted::All,
+            );
+            let told = || format!("{}: {ray:?} {hit:?} for {truth:?}", reference.name);
+            let distance = hit.distance().unwrap_or(f64::INFINITY);
+            if truth.begins {
+                // Where the bound cuts through the solid.
+                assert!((distance - start).abs() <= footprint, "{}", told());
+                continue;
+            }
+            // The first root of a pair that is far enough apart is met at the latest.
+            let roots: Vec<Interval> = truth.roots().collect();
+            let mut entries = roots.chunks(2);
+            let missed = entries.any(|pair| {
+                let leaves = pair.get(1).map_or(end, |leave| leave.low);
+                leaves - pair[0].high > footprint && pair[0].high + footprint < distance
+            });
+            assert!(!missed || truth.rough().next().is_some(), "{}", told());
+            if hit.distance().is_some() {
+                met += 1;
+                // Polished within the gap of the grid, half a footprint, in which the side changes.
+                let room = 0.5 * footprint;
+                let is_root = truth
+                    .roots()
+                    .chain(truth.rough())
+                    .any(|part| part.low - room < distance && distance < part.high + room);
+                assert!(is_root, "{}", told());
+            }
+        }
+        assert!(met > count / 20, "{}: {met}", reference.name);
+    }
+}
+
+#[test]
+fn what_the_tracer_meets_is_a_root_and_no_root_is_missed() {
+    held_against_the_reference(1_024);
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn what_the_tracer_meets_is_a_root_along_10_000_rays() {
+    held_against_the_reference(10_048);
 }
 
 #[test]
@@ -157,7 +313,7 @@ fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
         for (ray, hit) in shadows.iter().zip(&shaded) {
             assert_eq!(
                 *hit != Hit::None,
-                scan(&surface, ray) != Hit::None,
+                scan(&surface, ray, &mut Scratch::new()) != Hit::None,
                 "{name}"
             );
         }

@@ -207,6 +207,22 @@ pub(super) fn cube() -> Description {
     scene
 }
 
+/// A surface within a distance of the origin, seen by parallel rays from aside.
+pub(super) fn orthographic(graph: Graph, field: NodeId, outer: f64) -> Description {
+    let bound = Bound::Shell { inner: 0.0, outer };
+    let mut scene = standing(graph, field, bound, [0.0; 3]);
+    scene.surface.seed = Seed::Sphere { radius: 1.0 };
+    scene.camera.path = Path::Fixed {
+        eye: [2.0, -4.0, 1.5],
+        target: [0.0; 3],
+        up: [0.0, 0.0, 1.0],
+    };
+    scene.camera.projection = Projection::Orthographic {
+        width: Curve::Constant(2.6),
+    };
+    scene
+}
+
 /// Every small scene, by name.
 pub(super) fn all() -> [(&'static str, Description); 6] {
     [

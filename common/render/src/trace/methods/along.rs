@@ -39,6 +39,12 @@ impl FieldAlong<'_> {
             time: self.time,
         }
     }
+
+    /// G(T) and G′(T) of the exact field, whose noises are not rounded to f32.
+    #[cfg(test)]
+    pub(super) fn exact(&self, t: Interval) -> Slope<1> {
+        self.program.along_exact(&self.segment(t))
+    }
 }
 
 impl Along for FieldAlong<'_> {

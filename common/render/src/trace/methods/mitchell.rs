@@ -7,7 +7,7 @@ use super::{Along, Hit, Method, Tally, Wanted, inside};
 
 /// Fig. 5.8 by intervals of the function and of its derivative.
 ///
-/// A range counts as two evaluations: thesis §5.4 says so of its cost.
+/// The derivative is asked for where the function's range holds 0, and counts as an evaluation of its own (thesis §5.4).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Mitchell {
     /// Widths below this are not searched.
@@ -42,7 +42,11 @@ impl Method for Mitchell {
             if (wanted == Wanted::First && !roots.is_empty()) || tally.spent(begun) {
                 break;
             }
-            tally.ranges += 2;
+            tally.ranges += 1;
+            if !ray.interval(t).contains(0.0) {
+                continue;
+            }
+            tally.ranges += 1;
             let slope = ray.slope(t);
             if !slope.value.contains(0.0) {
                 continue;

@@ -26,7 +26,7 @@ mod sphere;
 mod subdivision;
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 pub use along::{Along, FieldAlong};
 pub use mitchell::Mitchell;
