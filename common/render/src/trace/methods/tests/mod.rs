@@ -318,7 +318,7 @@ fn many(which: usize) {
 
 /// One ray of many.
 fn one(surface: &Surface, i: u32, seen: &mut Seen) {
-    let wanted = if i % ALL == 0 {
+    let wanted = if i.is_multiple_of(ALL) {
         Wanted::All
     } else {
         Wanted::First
@@ -326,10 +326,10 @@ fn one(surface: &Surface, i: u32, seen: &mut Seen) {
     let compared = Compared::new(surface, 1_000 + i, wanted, seen);
     for method in methods(surface) {
         let affine = method.name() == "standard AA";
-        if !affine || i % AFFINE == 0 {
+        if !affine || i.is_multiple_of(AFFINE) {
             compared.first(method.as_ref(), seen);
         }
-        if i % ALL == 0 && (!affine || i % (ALL * AFFINE) == 0) {
+        if i.is_multiple_of(ALL) && (!affine || i.is_multiple_of(ALL * AFFINE)) {
             compared.all(method.as_ref(), seen);
         }
     }

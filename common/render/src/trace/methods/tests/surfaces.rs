@@ -72,7 +72,7 @@ fn surface(
     Surface {
         name,
         program,
-        plain: (!cascades).then(|| (fields.0, root)),
+        plain: (!cascades).then_some((fields.0, root)),
         lipschitz,
         finest,
     }
