@@ -1,8 +1,6 @@
 //! CPU time of the calling thread.
 
-use std::fs;
-use std::time::Instant;
-
+use crate::bench::clock::Clock;
 use crate::error::Error;
 
 /// A turn takes at least this long: the system counts a thread's time in steps of up to 4 ms.
@@ -26,35 +24,6 @@ pub(crate) fn seconds(mut what: impl FnMut() -> Result<(), Error>) -> Result<f64
         }
         wanted = done * 2;
     }
-}
-
-/// This thread's CPU time where the system tells it, else the time of the wall.
-struct Clock {
-    started: Instant,
-    cpu: Option<u64>,
-}
-
-impl Clock {
-    fn start() -> Self {
-        Self {
-            cpu: cpu_nanoseconds(),
-            started: Instant::now(),
-        }
-    }
-
-    fn seconds(&self) -> f64 {
-        let cpu = self.cpu.zip(cpu_nanoseconds());
-        match cpu {
-            Some((start, end)) if end >= start => (end - start) as f64 * 1e-9,
-            _ => self.started.elapsed().as_secs_f64(),
-        }
-    }
-}
-
-/// Nanoseconds that this thread has been on a processor, as Linux counts them.
-fn cpu_nanoseconds() -> Option<u64> {
-    let text = fs::read_to_string("/proc/thread-self/schedstat").ok()?;
-    text.split_whitespace().next()?.parse().ok()
 }
 
 #[cfg(test)]

@@ -2,16 +2,13 @@
 
 use std::hint::black_box;
 
-use field::{Interval, Program};
+use field::Interval;
 use render::methods::{Along as _, FieldAlong, Hit, Method, Optimised, Speculative};
 
 use super::clock;
-use super::pairs::{Amount, Reason, Side, compile};
+use super::pairs::{Amount, Reason, Side};
 use crate::bench::cast::cast;
-use crate::bench::thesis::{self, Row};
-
-/// ε of both methods, metres; that of `bench thesis`.
-const EPSILON: f64 = 1e-7;
+use crate::bench::thesis::{Experiment, Setting, lipschitz};
 
 /// Evaluations of one turn.
 const EVALUATIONS: u32 = 4096;
@@ -19,50 +16,58 @@ const EVALUATIONS: u32 = 4096;
 /// How long the interval is over which a field is bounded, metres: about what the last steps of a search see.
 const STRETCH: f64 = 1.0 / 64.0;
 
-/// A row of the thesis's tables.
-pub(crate) fn row(index: usize) -> Result<&'static Row, Reason> {
-    thesis::ROWS
-        .get(index)
-        .ok_or_else(|| format!("the thesis's tables have no row {index}"))
+/// The ray along which a field is evaluated: beside the image's middle, through the whole scene.
+const PLACE: [f64; 2] = [0.1, 0.07];
+const LENGTH: f64 = 8.0;
+
+/// What is cast at in the thesis's tables, by their order.
+pub(crate) fn setting(index: usize) -> Result<Setting, Reason> {
+    let experiment = Experiment::embedded()?;
+    let noise = experiment.noises.get(index);
+    noise
+        .ok_or_else(|| format!("the thesis's tables have no row {index}"))?
+        .setting()
 }
 
-/// Speculative sphere tracing with a λ that is a bound where there is one, and the guaranteed method.
+/// Speculative sphere tracing with a λ that is a bound, and the guaranteed method.
 pub(crate) fn sides<'a>(index: usize, side: u32) -> Result<[Side<'a>; 2], Reason> {
-    let row = row(index)?;
+    let Experiment {
+        epsilon,
+        overshoot,
+        noises,
+    } = Experiment::embedded()?;
+    let bound = noises.get(index).and_then(|noise| noise.lambda.last());
+    let bound = *bound.ok_or_else(|| format!("row {index} has no λ"))?;
     let hit = Hit::Converged;
     let speculative = Speculative {
-        lipschitz: Row::lipschitz(row.lipschitz_true.unwrap_or(row.lipschitz_thesis)),
-        overshoot: thesis::OVERSHOOT,
-        epsilon: EPSILON,
+        lipschitz: lipschitz(bound),
+        overshoot,
+        epsilon,
         hit,
     };
-    let optimised = Optimised {
-        epsilon: EPSILON,
-        hit,
-    };
-    Ok([timed(row, side, speculative)?, timed(row, side, optimised)?])
+    let optimised = Optimised { epsilon, hit };
+    Ok([
+        timed(setting(index)?, side, epsilon, speculative),
+        timed(setting(index)?, side, epsilon, optimised),
+    ])
 }
 
-fn timed<'a>(row: &'static Row, side: u32, method: impl Method + 'a) -> Result<Side<'a>, Reason> {
-    let program = compile(&row.field())?;
-    let settings = (None, EPSILON);
-    Ok(Side {
+fn timed<'a>(setting: Setting, side: u32, epsilon: f64, method: impl Method + 'a) -> Side<'a> {
+    Side {
         called: method.name().to_owned(),
         turn: Box::new(move || {
             clock::seconds(|| {
-                black_box(cast(&program, row.radius(), side, &method, settings));
+                black_box(cast(&setting, side, &method, (None, epsilon)));
                 Ok(())
             })
         }),
         amount: None,
-    })
+    }
 }
 
 /// Evaluations at points and in reduced affine arithmetic, one after the other along a ray.
 pub(crate) fn evaluations<'a>(index: usize) -> Result<[Side<'a>; 2], Reason> {
-    let row = row(index)?;
-    let points = compile(&row.field())?;
-    let ranges = compile(&row.field())?;
+    let (points, ranges) = (setting(index)?, setting(index)?);
     Ok([
         along("a point", points, |ray, t| {
             black_box(ray.value(t));
@@ -73,20 +78,21 @@ pub(crate) fn evaluations<'a>(index: usize) -> Result<[Side<'a>; 2], Reason> {
     ])
 }
 
-fn along<'a>(called: &str, program: Program, at: impl Fn(&FieldAlong<'_>, f64) + 'a) -> Side<'a> {
+fn along<'a>(called: &str, setting: Setting, at: impl Fn(&FieldAlong<'_>, f64) + 'a) -> Side<'a> {
     Side {
         called: called.to_owned(),
         turn: Box::new(move || {
             clock::seconds(|| {
+                let (origin, direction) = setting.ray(PLACE);
                 let ray = FieldAlong {
-                    program: &program,
-                    origin: [0.3, -thesis::DISTANCE, 0.2],
-                    direction: [0.0, 1.0, 0.0],
+                    program: &setting.program,
+                    origin,
+                    direction,
                     time: 0.0,
                 };
                 for i in 0..EVALUATIONS {
                     let share = f64::from(i) / f64::from(EVALUATIONS);
-                    at(&ray, 2.0 * thesis::DISTANCE * share);
+                    at(&ray, LENGTH * share);
                 }
                 Ok(())
             })

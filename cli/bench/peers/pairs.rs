@@ -6,6 +6,7 @@ use field::{Interval, Program, SimdLevel};
 
 use super::rows::{Budget, Library, Ours, Row, Shape, What};
 use super::{clock, methods, noise, ours, povray};
+use crate::bench::thesis::Setting;
 use crate::error::Error;
 use crate::load::Scene;
 
@@ -99,8 +100,7 @@ impl<'a> Place<'a> {
             }
             What::Tracer { thesis } => {
                 let [speculative, _] = methods::sides(thesis, self.side * WHOLE)?;
-                let field = format!("surface.field=\"{}\"", methods::row(thesis)?.field());
-                Ok(pair(self.traced(thesis, &field)?, speculative))
+                Ok(pair(self.traced(&methods::setting(thesis)?)?, speculative))
             }
             What::Reduced { thesis } => {
                 let [point, reduced] = methods::evaluations(thesis)?;
@@ -138,14 +138,11 @@ impl<'a> Place<'a> {
 
     /// The renderer's own search over the surface of a thesis row, for as long as methods take whose rays are
     /// those that meet the bounding sphere: the time of a whole picture, shading included.
-    fn traced(&self, thesis: usize, field: &str) -> Result<Side<'a>, Reason> {
+    fn traced(&self, setting: &Setting) -> Result<Side<'a>, Reason> {
         let more = [
-            field.to_owned(),
+            format!("surface.field=\"{}\"", setting.field),
             format!("film.resolution=\"{0}x{0}\"", self.side * WHOLE),
-            format!(
-                "surface.bound.shell=[0, {}]",
-                methods::row(thesis)?.radius()
-            ),
+            format!("surface.bound.shell=[0, {}]", setting.radius),
         ];
         let scene = self.load(super::rows::SPHERE, &more)?;
         Ok(Side {
