@@ -17,7 +17,7 @@ const LAYERS: [(f64, f64); 3] = [(0.3, 4.0), (0.15, 8.0), (0.05, 16.0)];
 const CLOSE: f64 = 0.3;
 
 /// Most boxes of a cell that are cut; then what is proven counts.
-const BOXES_MAX: u32 = 150;
+const BOXES_MAX: u32 = 40;
 
 /// The bound that holds in every cell, reached in some: ERRATA row 1782.
 const STEEPEST: f64 = 3.75;

@@ -87,6 +87,6 @@ fn cells_bound_the_noise_within_them() {
         sums += length.bound(cell) / 40.0;
         falls += fall.bound(cell) / 40.0;
     }
-    // On average well below the bound that holds in every cell.
-    assert!(falls < sums && sums < 3.75, "{falls} {sums}");
+    // What a cell proves of its gradient's length in so few boxes is hardly less than the bound of all cells; of its fall it is.
+    assert!(falls < 0.95 * sums && sums <= 3.75, "{falls} {sums}");
 }

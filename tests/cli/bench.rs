@@ -38,11 +38,12 @@ fn the_thesis_s_tables_are_printed_with_its_numbers() {
     let hits = |list: &str, i: usize| gradient[list][i]["hits"].as_u64().unwrap();
     assert_eq!(hits("casting", 0), hits("casting", 3));
     assert!(hits("casting", 0) > 10);
-    // The other noises' kernels are correlated too, and the cellular's minima lose nothing by being reduced.
+    // Eq. (5.27) needs correlation, which other noises have too; the cellular's minima lose nothing by being reduced.
     let cellular = &json["noises"][1];
     assert_eq!(cellular["noise"], "cellular");
     let casting = |i: usize| cellular["casting"][i]["evaluations"].as_f64().unwrap();
-    assert!(casting(0) > 1.05 * casting(2) && casting(2) > casting(3));
+    assert!(casting(1) > 0.9 * casting(2) && casting(2) > 1.2 * casting(3));
+    assert!(casting(0) > 1.2 * casting(3));
     assert_eq!(json["noises"].as_array().map(Vec::len), Some(2));
     assert!(text.contains("fixed beforehand"), "{text}");
 }

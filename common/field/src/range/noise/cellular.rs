@@ -6,7 +6,6 @@
 //! Nodes that are certainly farther than enough others are never looked at.
 
 use super::Near;
-use crate::interval::Interval;
 use crate::noise::cellular::{Cellular, Norm, ORDERS, REACH};
 use crate::range::Arithmetic;
 
@@ -24,8 +23,7 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
     let direct = squared && cellular.norm() == Norm::Two;
     let cap = if direct { REACH * REACH } else { REACH };
     let mut sorted = vec![T::constant(cap); weights.len()];
-    let (nodes, ranges) = candidates(cellular, &near);
-    for node in nodes {
+    for node in candidates(cellular, &near) {
         let ways = near.from(node);
         let mut length = if direct {
             super::squares(ways)
@@ -38,10 +36,7 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
         }
     }
     let mut total = T::constant(-cellular.bias());
-    for ((distance, range), weight) in sorted.into_iter().zip(ranges).zip(weights) {
-        // Over wide spans the nodes' own distances say more than minima of forms.
-        let range = if direct { range.square() } else { range };
-        let distance = distance.within(range);
+    for (distance, weight) in sorted.into_iter().zip(weights) {
         let psi = if squared && !direct {
             distance.square()
         } else {
@@ -52,15 +47,11 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
     Some(total.settled(at))
 }
 
-/// The nodes that can be among those that count, anywhere in range, and what the sorted distances can be.
-fn candidates<T: Arithmetic>(
-    cellular: &Cellular,
-    near: &Near<T>,
-) -> (Vec<[f64; 3]>, [Interval; ORDERS]) {
+/// The nodes that can be among those that count, anywhere in range.
+fn candidates<T: Arithmetic>(cellular: &Cellular, near: &Near<T>) -> Vec<[f64; 3]> {
     let norm = cellular.norm();
-    let mut ranges = [Interval::new(0.0, REACH); ORDERS];
     let Some(last) = cellular.weights().len().checked_sub(1) else {
-        return (Vec::new(), ranges);
+        return Vec::new();
     };
     // However the place lies, as many nodes as there are orders are no farther than these.
     let mut most = [REACH; ORDERS];
@@ -99,15 +90,7 @@ fn candidates<T: Arithmetic>(
         }
     }
     seen.retain(|(_, low)| *low <= most[last] + ROOM);
-    // At least the l-th smallest of the least distances, at most that of the greatest.
-    let mut lows: Vec<f64> = seen.iter().map(|(_, low)| *low).collect();
-    lows.resize(lows.len() + ORDERS, REACH);
-    lows.sort_by(f64::total_cmp);
-    for ((range, low), high) in ranges.iter_mut().zip(lows).zip(most) {
-        let low = crate::interval::smaller(low, REACH);
-        *range = Interval::new(low, crate::interval::larger(low, high)).expand(1e-12);
-    }
-    (seen.into_iter().map(|(node, _)| node).collect(), ranges)
+    seen.into_iter().map(|(node, _)| node).collect()
 }
 
 /// ‖d‖ as the norm has it, thesis eq. (4.20).

@@ -119,6 +119,15 @@ impl<T: Arithmetic> Near<T> {
     }
 }
 
+/// The form, or some number of `range` where the form is much wider: over wide spans a band says less than an image.
+fn unless_wide<T: Arithmetic>(form: T, range: Interval) -> T {
+    if form.range().width() > 1.5 * range.width() {
+        T::any(range)
+    } else {
+        form
+    }
+}
+
 /// The least distance of two intervals.
 fn apart(a: Interval, b: Interval) -> f64 {
     if a.low > b.high {

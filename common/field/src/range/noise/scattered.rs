@@ -3,7 +3,7 @@
 //! A kernel is ξ h(√q), q the squared distance from its node in units of its own. As the thesis says, the symbols that
 //! the three squares make are the kernel's alone, so that reduced arithmetic loses nothing by condensing them.
 
-use super::{Near, OFFSETS, REACHED, dot, square, squares};
+use super::{Near, OFFSETS, REACHED, dot, square, squares, unless_wide};
 use crate::interval::Interval;
 use crate::noise::disc::Tile;
 use crate::noise::lattice::height;
@@ -56,8 +56,6 @@ fn nodes<T: Arithmetic>(
     let profile = Function::Profile(Profile::Radial(sparse.kernel));
     let mut sum: Option<T> = None;
     let (mut count, mut heights) = (0.0, 0.0);
-    // What the kernels can be without any correlation: over wide spans that says more than forms do.
-    let mut apart = Interval::point(0.0);
     let mut add = |state: u32, index: u32, node: [f64; 3]| {
         if square(near.least(node)) > 1.0 + REACHED {
             return;
@@ -73,13 +71,7 @@ fn nodes<T: Arithmetic>(
         count += 1.0;
         heights += xi.abs();
         let image = profile.image(far);
-        apart = apart.add(image.mul(Interval::point(xi)));
-        let part = q
-            .within(far)
-            .apply(profile)
-            .within(image)
-            .times(xi)
-            .settled(at);
+        let part = unless_wide(q.apply(profile), image).times(xi).settled(at);
         sum = Some(match sum.take() {
             Some(sum) => sum.plus(part),
             None => part,
@@ -110,7 +102,7 @@ fn nodes<T: Arithmetic>(
     // A sum of n terms adds n · 2⁻²⁴ of their total.
     let blur = heights * (rougher * kernel + count * 6e-8);
     match sum {
-        Some(sum) => sum.settled(at).within(apart).computed(blur).within(range),
+        Some(sum) => sum.settled(at).computed(blur).within(range),
         None => T::constant(0.0),
     }
 }
