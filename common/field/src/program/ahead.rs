@@ -18,7 +18,8 @@ use fearless_simd::Simd;
 
 use crate::arithmetic::{Binary, Unary};
 use crate::number::Number;
-use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation, TIME};
+use crate::program::code::{Code, FOOTPRINT, Instruction, Operation, TIME};
+use crate::program::machine;
 use crate::program::slopes::Slopes;
 use lanes::{Stretches, WIDTH, row};
 use octaves::{Growth, Octaves};
@@ -73,22 +74,9 @@ pub(crate) fn bounds(code: &Code) -> bool {
 impl Ahead {
     /// Makes room for the code and sets its constants.
     pub(crate) fn prepare(&mut self, code: &Code) {
-        let grown = self.registers.len() < code.registers;
-        if grown {
-            self.registers.resize_with(code.registers, Stretches::new);
-        }
-        let same = self.constants.len() == code.constants.len()
-            && self
-                .constants
-                .iter()
-                .zip(&code.constants)
-                .all(|(a, b)| a.to_bits() == b.to_bits());
-        if grown || !same {
-            for (register, constant) in self.registers[INPUTS..].iter_mut().zip(&code.constants) {
-                register.fill(Stretch::constant(*constant));
-            }
-            self.constants.clone_from(&code.constants);
-        }
+        let (registers, constants) = (&mut self.registers, &mut self.constants);
+        let set = |lanes: &mut Stretches, value| lanes.fill(Stretch::constant(value));
+        machine::prepare(registers, constants, code, Stretches::new, set);
     }
 
     /// How far ahead of some places no root can be, from `length` as a first guess, which it replaces. What the

@@ -71,6 +71,32 @@ impl Count {
     }
 }
 
+/// Makes room for the code among a machine's registers and sets those of its constants; returns whether there are new ones.
+pub(crate) fn prepare<R>(
+    registers: &mut Vec<Box<R>>,
+    constants: &mut Vec<f64>,
+    code: &Code,
+    new: impl FnMut() -> Box<R>,
+    set: impl Fn(&mut R, f64),
+) -> bool {
+    let grown = registers.len() < code.registers;
+    if grown {
+        registers.resize_with(code.registers, new);
+    }
+    let same = constants.len() == code.constants.len()
+        && constants
+            .iter()
+            .zip(&code.constants)
+            .all(|(a, b)| a.to_bits() == b.to_bits());
+    if grown || !same {
+        for (register, constant) in registers[INPUTS..].iter_mut().zip(&code.constants) {
+            set(register, *constant);
+        }
+        constants.clone_from(&code.constants);
+    }
+    grown
+}
+
 /// Copies the points from `start` on into input registers, as many as fit.
 pub(crate) fn load<'r>(
     points: &Points<'_>,
@@ -91,23 +117,11 @@ pub(crate) fn load<'r>(
 impl Machine {
     /// Makes room for the code and sets its constants.
     pub(crate) fn prepare(&mut self, code: &Code) {
-        let grown = self.registers.len() < code.registers;
-        if grown {
-            self.registers
-                .resize_with(code.registers, || Box::new([0.0; BATCH]));
-        }
-        let same = self.constants.len() == code.constants.len()
-            && self
-                .constants
-                .iter()
-                .zip(&code.constants)
-                .all(|(a, b)| a.to_bits() == b.to_bits());
-        if grown || !same {
-            for (register, constant) in self.registers[INPUTS..].iter_mut().zip(&code.constants) {
-                register.fill(*constant);
-            }
-            self.constants.clone_from(&code.constants);
-        }
+        let new = || Box::new([0.0; BATCH]);
+        let (registers, constants) = (&mut self.registers, &mut self.constants);
+        prepare(registers, constants, code, new, |lanes, value| {
+            lanes.fill(value);
+        });
     }
 
     /// Evaluates the points from `start` on, as many as a batch holds, and adds to `noises` how many noises that took.

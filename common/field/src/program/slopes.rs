@@ -12,7 +12,7 @@ use crate::noise::{Lattice, batch};
 use crate::number::{Dual, Number};
 use crate::op::Basis;
 use crate::points::{BATCH, Points};
-use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
+use crate::program::code::{Code, FOOTPRINT, Instruction, Operation};
 use crate::program::machine::{self, Count};
 
 /// Duals, one per lane, as structure of arrays.
@@ -183,26 +183,13 @@ impl<const N: usize> Default for Slopes<N> {
 impl<const N: usize> Slopes<N> {
     /// Makes room for the code, sets its constants and the gradients of its inputs.
     pub(crate) fn prepare(&mut self, code: &Code) {
-        let grown = self.registers.len() < code.registers;
-        if grown {
-            self.registers.resize_with(code.registers, Duals::new);
-            if N == 3 {
-                for axis in 0..N {
-                    self.registers[axis].gradient[axis].fill(1.0);
-                }
+        let (registers, constants) = (&mut self.registers, &mut self.constants);
+        let set = Duals::set_constant;
+        let grown = machine::prepare(registers, constants, code, Duals::new, set);
+        if grown && N == 3 {
+            for axis in 0..N {
+                self.registers[axis].gradient[axis].fill(1.0);
             }
-        }
-        let same = self.constants.len() == code.constants.len()
-            && self
-                .constants
-                .iter()
-                .zip(&code.constants)
-                .all(|(a, b)| a.to_bits() == b.to_bits());
-        if grown || !same {
-            for (register, constant) in self.registers[INPUTS..].iter_mut().zip(&code.constants) {
-                register.set_constant(*constant);
-            }
-            self.constants.clone_from(&code.constants);
         }
     }
 
