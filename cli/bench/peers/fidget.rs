@@ -23,7 +23,7 @@ const BALLS: [[f32; 3]; 6] = [
     [0.309_769_84, 0.536_537_1, -0.784_965_34],
     [-0.600_766_36, 0.010_904_375, -0.799_350_3],
     [-0.309_826_64, 0.514_826_7, 0.799_350_3],
-    [-0.983_698_04, -0.002_513_356, 0.179_810_63],
+    [-0.983_698, -0.002_513_356, 0.179_810_63],
     [-0.489_672_4, 0.853_164_14, -0.179_810_63],
 ];
 
@@ -62,7 +62,7 @@ fn blob([x, y, z]: &[Tree; 3]) -> Tree {
         let square =
             (x.clone() - bx).square() + (z.clone() + by).square() + (y.clone() - bz).square();
         let rest = (1.0 - square * (1.0 / (RADIUS * RADIUS))).max(0.0);
-        field = field - rest.square();
+        field -= rest.square();
     }
     field
 }
@@ -73,7 +73,7 @@ fn sphere(p: &[Tree; 3], layers: usize) -> Tree {
     let mut frequency = 4.0;
     for amplitude in AMPLITUDES.into_iter().take(layers) {
         let q = [0, 1, 2].map(|axis| p[axis].clone() * frequency);
-        field = field + noise(&q) * amplitude;
+        field += noise(&q) * amplitude;
         frequency *= 2.0;
     }
     field
