@@ -3,67 +3,22 @@
 //! Registers hold duals: a value and its derivatives, either by the world's x, y, z (`N` = 3) or along
 //! one direction of each lane's own (`N` = 1). Footprint and time count as constants.
 
+mod duals;
+mod octaves;
+mod tape;
+
 use fearless_simd::Simd;
 
 use crate::arithmetic::{self, Binary, Unary};
-use crate::cascade::{self, Carried, Cascade, Model, Octave, Term};
-use crate::lanes::{self, Cells, Lanes};
-use crate::noise::{Lattice, batch};
+use crate::lanes;
+use crate::noise::batch;
 use crate::number::{Dual, Number};
-use crate::op::Basis;
 use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, Instruction, Operation};
 use crate::program::machine::{self, Count};
-
-/// Duals, one per lane, as structure of arrays.
-#[derive(Debug)]
-pub(crate) struct Duals<const N: usize> {
-    pub(crate) value: Lanes,
-    pub(crate) gradient: [Lanes; N],
-}
-
-impl<const N: usize> Duals<N> {
-    fn new() -> Box<Self> {
-        Box::new(Self {
-            value: [0.0; BATCH],
-            gradient: [[0.0; BATCH]; N],
-        })
-    }
-
-    #[inline(always)]
-    fn at(&self, i: usize) -> Dual<N> {
-        let mut gradient = [0.0; N];
-        for (part, lanes) in gradient.iter_mut().zip(&self.gradient) {
-            *part = lanes[i];
-        }
-        Dual {
-            value: self.value[i],
-            gradient,
-        }
-    }
-
-    #[inline(always)]
-    fn set(&mut self, i: usize, dual: Dual<N>) {
-        self.value[i] = dual.value;
-        for (lanes, part) in self.gradient.iter_mut().zip(dual.gradient) {
-            lanes[i] = part;
-        }
-    }
-
-    fn clear(&mut self, n: usize) {
-        self.value[..n].fill(0.0);
-        for lanes in &mut self.gradient {
-            lanes[..n].fill(0.0);
-        }
-    }
-
-    fn set_constant(&mut self, value: f64) {
-        self.value.fill(value);
-        for lanes in &mut self.gradient {
-            lanes.fill(0.0);
-        }
-    }
-}
+use duals::Duals;
+use octaves::Octaves;
+pub(crate) use tape::{Sample, Tape};
 
 /// The registers of duals.
 #[derive(Debug)]
@@ -75,92 +30,6 @@ pub(crate) struct Slopes<const N: usize> {
     pub(crate) tape: Tape<N>,
 }
 
-/// What noises gave, in the order in which the code asks for them.
-#[derive(Debug, Default)]
-pub(crate) struct Tape<const N: usize> {
-    /// Whether every noise is kept; else each takes the place of the last.
-    keeps: bool,
-    samples: Vec<Box<Sample<N>>>,
-    /// The next sample's place.
-    next: usize,
-    /// Of every cascade, how many octaves it has evaluated and its depths.
-    cascades: Vec<(usize, Box<Lanes>)>,
-    next_cascade: usize,
-}
-
-impl<const N: usize> Tape<N> {
-    fn rewind(&mut self) {
-        (self.next, self.next_cascade) = (0, 0);
-    }
-
-    /// Where the next noise goes.
-    #[inline(always)]
-    fn sample(&mut self) -> &mut Sample<N> {
-        let place = if self.keeps { self.next } else { 0 };
-        self.next += 1;
-        if place == self.samples.len() {
-            self.samples.push(Box::new(Sample {
-                noise: [0.0; BATCH],
-                gradient: [[0.0; BATCH]; N],
-            }));
-        }
-        &mut self.samples[place]
-    }
-
-    fn keep_cascade(&mut self, n: usize, octaves: usize, depth: &Lanes) {
-        if !self.keeps {
-            return;
-        }
-        if self.next_cascade == self.cascades.len() {
-            self.cascades.push((0, Box::new([0.0; BATCH])));
-        }
-        let (count, kept) = &mut self.cascades[self.next_cascade];
-        *count = octaves;
-        kept[..n].copy_from_slice(&depth[..n]);
-        self.next_cascade += 1;
-    }
-
-    /// The noise that was asked for as number `i`.
-    pub(crate) fn sample_at(&self, i: usize) -> &Sample<N> {
-        &self.samples[i]
-    }
-
-    /// The cascade that was asked for as number `i`: how many octaves it evaluated, and its depths.
-    pub(crate) fn cascade_at(&self, i: usize) -> (usize, &Lanes) {
-        let (octaves, depth) = &self.cascades[i];
-        (*octaves, depth)
-    }
-}
-
-/// Room for the octaves of one cascade.
-#[derive(Debug)]
-struct Octaves<const N: usize> {
-    cells: Cells,
-    /// Directions in the octave's lattice; of use where `N` is 1.
-    along: [[f32; BATCH]; 3],
-    /// All three derivatives of a noise that is not asked along a direction itself.
-    full: [[f32; BATCH]; 3],
-    depth: Lanes,
-    total: Box<Duals<N>>,
-    rest: Box<Duals<N>>,
-}
-
-/// One octave's noise over the lanes.
-#[derive(Debug)]
-pub(crate) struct Sample<const N: usize> {
-    pub(crate) noise: [f32; BATCH],
-    pub(crate) gradient: [[f32; BATCH]; N],
-}
-
-/// Which octave.
-#[derive(Clone, Copy)]
-struct Place<'a> {
-    n: usize,
-    i: f64,
-    octave: &'a Octave,
-    depth: &'a Lanes,
-}
-
 impl<const N: usize> Default for Slopes<N> {
     fn default() -> Self {
         Self {
@@ -168,14 +37,7 @@ impl<const N: usize> Default for Slopes<N> {
             constants: Vec::new(),
             result: Duals::new(),
             tape: Tape::default(),
-            octaves: Box::new(Octaves {
-                cells: Cells::new(),
-                along: [[0.0; BATCH]; 3],
-                full: [[0.0; BATCH]; 3],
-                depth: [0.0; BATCH],
-                total: Duals::new(),
-                rest: Duals::new(),
-            }),
+            octaves: Box::new(Octaves::new()),
         }
     }
 }
@@ -419,65 +281,6 @@ fn directions<const N: usize>(
     }
 }
 
-impl<const N: usize> Sample<N> {
-    /// The noise in `cells`: with its gradient, or its derivative along `along`.
-    #[inline(always)]
-    fn fill<S: Simd>(
-        &mut self,
-        simd: S,
-        n: usize,
-        lattice: Lattice,
-        cells: &mut Cells,
-        along: &[[f32; BATCH]; 3],
-    ) {
-        let Self {
-            noise, gradient, ..
-        } = self;
-        match gradient.as_mut_slice() {
-            [slope] => lanes::values_along(simd, n, lattice, cells, along, noise, slope),
-            [x, y, z] => lanes::values_gradients(simd, n, lattice, cells, noise, [x, y, z]),
-            _ => unreachable!("derivatives are by one or three variables"),
-        }
-    }
-
-    /// Takes a noise's gradient, or its derivative along `along`.
-    #[inline(always)]
-    fn take(&mut self, n: usize, [x, y, z]: &[[f32; BATCH]; 3], along: &[[f32; BATCH]; 3]) {
-        let [p, q, r] = along;
-        match self.gradient.as_mut_slice() {
-            [slope] => {
-                for (i, slope) in slope[..n].iter_mut().enumerate() {
-                    *slope = x[i] * p[i] + y[i] * q[i] + z[i] * r[i];
-                }
-            }
-            parts => {
-                for (part, given) in parts.iter_mut().zip([x, y, z]) {
-                    part[..n].copy_from_slice(&given[..n]);
-                }
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn slopes(&self, i: usize) -> [f64; N] {
-        let mut slopes = [0.0; N];
-        for (slope, lanes) in slopes.iter_mut().zip(&self.gradient) {
-            *slope = f64::from(lanes[i]);
-        }
-        slopes
-    }
-
-    /// A value with these derivatives at a place that has its own.
-    #[inline(always)]
-    fn pulled(&self, i: usize, [a, b, c]: [&Duals<N>; 3], value: f64) -> Dual<N> {
-        let gradient = self.slopes(i);
-        if N == 1 {
-            return Dual { value, gradient };
-        }
-        pull(triple(gradient), [a.at(i), b.at(i), c.at(i)], value)
-    }
-}
-
 /// A function of a place, given its slopes there and the place's own gradients.
 #[inline(always)]
 fn pull<const N: usize>([s, t, u]: [f64; 3], [a, b, c]: [Dual<N>; 3], value: f64) -> Dual<N> {
@@ -497,166 +300,6 @@ fn length<const N: usize>(a: Dual<N>, b: Dual<N>, c: Dual<N>) -> Dual<N> {
         [a, b, c],
         length,
     )
-}
-
-impl<const N: usize> Octaves<N> {
-    #[inline(always)]
-    fn run<S: Simd>(
-        &mut self,
-        simd: S,
-        cascade: &Cascade,
-        count: Count,
-        at: [&Duals<N>; 3],
-        footprint: &Lanes,
-        tape: &mut Tape<N>,
-    ) -> u64 {
-        let n = count.lanes;
-        let mut noises = 0;
-        let place = at.map(|part| &part.value);
-        let Self {
-            cells,
-            along,
-            full,
-            depth,
-            total,
-            rest,
-        } = self;
-        machine::depths(cascade, n, footprint, depth);
-        let mut octaves = 0;
-        total.clear(n);
-        rest.clear(n);
-        for (i, octave) in cascade.octaves.iter().enumerate() {
-            let i = cascade::index(i);
-            let live = machine::live(depth, count.points, i);
-            if live == 0 {
-                break;
-            }
-            noises += live;
-            octaves += 1;
-            let sample = tape.sample();
-            lanes::place(simd, n, octave, place, cells);
-            if N == 1 {
-                directions(n, &octave.matrix, at, along);
-            }
-            match &octave.noise {
-                None => sample.fill(simd, n, octave.lattice, cells, along),
-                Some(any) => {
-                    batch::values_gradients(simd, n, any, cells, &mut sample.noise, full);
-                    sample.take(n, full, along);
-                }
-            }
-            let place = Place {
-                n,
-                i,
-                octave,
-                depth,
-            };
-            add(cascade.model, place, sample, total, rest);
-        }
-        tape.keep_cascade(n, octaves, depth);
-        noises
-    }
-}
-
-#[inline(always)]
-fn add<const N: usize>(
-    model: Model,
-    at: Place<'_>,
-    sample: &Sample<N>,
-    total: &mut Duals<N>,
-    rest: &mut Duals<N>,
-) {
-    match model {
-        Model::Sum(Basis::Plain) => add_each(
-            at,
-            sample,
-            total,
-            rest,
-            #[inline(always)]
-            |t, n, c| cascade::sum(Basis::Plain, t, n, c),
-        ),
-        Model::Sum(Basis::Absolute) => add_each(
-            at,
-            sample,
-            total,
-            rest,
-            #[inline(always)]
-            |t, n, c| cascade::sum(Basis::Absolute, t, n, c),
-        ),
-        Model::Sum(Basis::Ridged) => add_each(
-            at,
-            sample,
-            total,
-            rest,
-            #[inline(always)]
-            |t, n, c| cascade::sum(Basis::Ridged, t, n, c),
-        ),
-        Model::AltitudeOne { basis, xi } => {
-            add_each(
-                at,
-                sample,
-                total,
-                rest,
-                #[inline(always)]
-                |t, n, c| cascade::altitude_one(basis, xi, t, n, c),
-            );
-        }
-        Model::AltitudeTwo { basis, xi } => {
-            add_each(
-                at,
-                sample,
-                total,
-                rest,
-                #[inline(always)]
-                |t, n, c| cascade::altitude_two(basis, xi, t, n, c),
-            );
-        }
-        Model::Ridged { offset, gain } => {
-            add_each(
-                at,
-                sample,
-                total,
-                rest,
-                #[inline(always)]
-                |t, n, c| cascade::ridged(offset, gain, t, n, c),
-            );
-        }
-    }
-}
-
-#[inline(always)]
-fn add_each<const N: usize>(
-    Place {
-        n,
-        i,
-        octave,
-        depth,
-    }: Place<'_>,
-    sample: &Sample<N>,
-    total: &mut Duals<N>,
-    rest: &mut Duals<N>,
-    add: impl Fn(Term, Dual<N>, Carried<Dual<N>>) -> Carried<Dual<N>>,
-) {
-    let (matrix, amplitude) = (octave.matrix, octave.amplitude);
-    for (lane, depth) in depth[..n].iter().copied().enumerate() {
-        let term = Term {
-            first: i == 0.0,
-            amplitude,
-            weight: cascade::weight(depth, i),
-        };
-        let mut gradient = sample.slopes(lane);
-        if N == 3 {
-            let pulled = cascade::pull(&matrix, triple(gradient));
-            gradient.copy_from_slice(&pulled);
-        }
-        let noise = Dual {
-            value: f64::from(sample.noise[lane]),
-            gradient,
-        };
-        let (sum, handed) = add(term, noise, (total.at(lane), rest.at(lane)));
-        total.set(lane, sum);
-        rest.set(lane, handed);
-    }
 }
 
 #[inline(always)]
