@@ -1,8 +1,12 @@
 //! The conformance suite of all arithmetics: what a range says holds at every point of it; derivatives are those of differences.
 
+mod cells;
+mod chains;
+mod functions;
+
 use super::function::Function;
 use super::profile::Profile;
-use super::{Affine, Arithmetic, Cell, Jet, Place, Reduced, Segment, Slope};
+use super::{Affine, Arithmetic, Jet, Place, Reduced, Segment, Slope};
 use crate::arithmetic::{Binary, Unary};
 use crate::curve::{Curve, Join};
 use crate::hash::{hash, unit};
@@ -11,6 +15,7 @@ use crate::noise::sparse::Kernel;
 use crate::number::Number;
 use crate::program::tests::{noise_zoo, zoo};
 use crate::{Points, Program, Scratch, SimdLevel};
+use cells::over_cells;
 
 /// Random numbers in [−1, 1], by name.
 fn number(words: &[u32]) -> f64 {
@@ -40,121 +45,9 @@ const BINARY: [Binary; 6] = [
     Binary::Max,
 ];
 
-fn functions() -> Vec<Function> {
-    let mut all: Vec<Function> = UNARY.into_iter().map(Function::Unary).collect();
-    all.extend([0.3, 0.5, 1.0, 2.0, 3.3].map(Function::Power));
-    all.extend([
-        Function::SmoothStep(-1.0, 2.5),
-        Function::Clamp,
-        Function::Square,
-        Function::Reciprocal,
-        Function::OntoSphere(2.0),
-        Function::Quintic,
-    ]);
-    all.extend(profiles().map(Function::Profile));
-    all
-}
-
 fn profiles() -> [Profile; 5] {
     let [a, b, c] = Kernel::ALL.map(Profile::Radial);
     [a, b, c, Profile::Simplex, Profile::Spline]
-}
-
-/// Whether no number below 0 is ever asked for.
-fn of_squares(function: Function) -> bool {
-    matches!(function, Function::Profile(profile) if profile != Profile::Spline)
-}
-
-#[test]
-fn functions_stay_within_image_band_and_slopes() {
-    for (k, function) in (0..).zip(functions()) {
-        let mut tight = 0;
-        for i in 0..6_000 {
-            let centre = 4.0 * number(&[k, i, 0]);
-            let half = scale(&[k, i, 1]);
-            // Squared distances: half of them beyond the kernel; a range may begin a little below 0, as rounding leaves it.
-            let centre = if of_squares(function) {
-                0.5 * centre.abs() + 0.99 * half
-            } else {
-                centre
-            };
-            let over = Interval::new(centre - half, centre + half);
-            let (image, slopes, band) = (
-                function.image(over),
-                function.slopes(over),
-                function.band(over),
-            );
-            tight += u32::from(band.is_some());
-            let mut before: Option<(f64, f64)> = None;
-            for j in 0..=8 {
-                let a = over.low + f64::from(j) / 8.0 * over.width();
-                let a = if a > over.high { over.high } else { a };
-                if of_squares(function) && a < 0.0 {
-                    continue;
-                }
-                let value = function.value(a);
-                let told = format!("{function:?} at {a} of {over:?}: {value}");
-                assert!(image.contains(value), "{told} outside {image:?}");
-                if let Some(band) = band {
-                    let off = (value - (band.alpha * a + band.beta)).abs();
-                    assert!(off <= band.delta, "{told} is {off} off {band:?}");
-                }
-                if let Some((b, old)) = before
-                    && a > b
-                {
-                    let chord = (value - old) / (a - b);
-                    let blur = 1e-14 * (value.abs() + old.abs() + 1.0) / (a - b);
-                    assert!(
-                        slopes.expand(blur).contains(chord),
-                        "{told}: chord {chord} outside {slopes:?}"
-                    );
-                }
-                before = Some((a, value));
-            }
-        }
-        assert!(tight > 2_000, "{function:?}: {tight} bands");
-    }
-}
-
-#[test]
-fn bands_are_no_wider_than_the_function_bends() {
-    // Chebyshev: the error over a short interval is h²|φ″|/4.
-    for function in functions() {
-        for i in 0..200 {
-            let a = 0.2 + 0.6 * unit(hash(&[i, 9]));
-            let half = 1e-3;
-            if function == Function::Profile(Profile::Spline) && (a - 0.5).abs() < 2.0 * half {
-                continue;
-            }
-            let band = function.band(Interval::new(a - half, a + half)).unwrap();
-            let bend = function.bend(a).abs();
-            let most = 0.26 * half * half * (bend * 1.1 + 0.1) + 3e-14;
-            assert!(band.delta <= most, "{function:?} at {a}: {band:?} {bend}");
-        }
-    }
-}
-
-#[test]
-fn derivatives_of_functions_are_those_of_differences() {
-    for function in functions() {
-        for i in 0..500 {
-            let a = 3.0 * number(&[i, 5]);
-            let a = if of_squares(function) { a.abs() } else { a };
-            let near = |x: f64| (a - x).abs() < 0.02;
-            if [-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5, 2.5]
-                .into_iter()
-                .any(near)
-            {
-                continue;
-            }
-            let h = 1e-5;
-            let slope = (function.value(a + h) - function.value(a - h)) / (2.0 * h);
-            let bend = (function.slope(a + h) - function.slope(a - h)) / (2.0 * h);
-            let close = |x: f64, y: f64| (x - y).abs() < 1e-6 * (1.0 + x.abs() + y.abs());
-            assert!(close(slope, function.slope(a)), "{function:?}′ at {a}");
-            assert!(close(bend, function.bend(a)), "{function:?}″ at {a}");
-        }
-    }
 }
 
 /// Whether a form holds `value` where its shared symbols are `e`.
@@ -164,88 +57,6 @@ fn holds<const N: usize>(form: &Reduced<N>, e: [f64; N], value: f64) -> bool {
     }
     let shared: f64 = form.along.iter().zip(e).map(|(x, e)| x * e).sum();
     (value - (form.centre + shared)).abs() <= form.error * (1.0 + 1e-12) + 1e-15 * form.centre.abs()
-}
-
-/// Chains of random operations on a few numbers of two shared symbols; at each, all arithmetics against points.
-fn chains(count: u32) {
-    const E: usize = 3;
-    let curve = Curve::new(Join::Smooth, &[-2.0, 1.0, 0.0, 3.0, 1.0, 2.5, 4.0, -2.0]);
-    for i in 0..count {
-        let e: [f64; E] = [0, 1, 2].map(|k| number(&[i, k, 77]));
-        let size = scale(&[i, 78]);
-        let start = |k: u32| {
-            let along = [0, 1, 2].map(|axis| size * number(&[i, k, axis, 79]));
-            Reduced::<E>::of_symbols(3.0 * number(&[i, k, 80]), along)
-        };
-        let value = |form: &Reduced<E>| {
-            form.centre + form.along.iter().zip(e).map(|(x, e)| x * e).sum::<f64>()
-        };
-        let mut forms: Vec<Reduced<E>> = (0..3).map(start).collect();
-        let mut points: Vec<f64> = forms.iter().map(value).collect();
-        // A point computed otherwise than the form may round otherwise.
-        for form in &mut forms {
-            *form = form.blurred(1e-14);
-        }
-        let mut full: Vec<Affine> = forms.iter().map(Affine::from_reduced).collect();
-        let mut spans: Vec<Interval> = forms.iter().map(Reduced::interval).collect();
-        for step in 0..12u32 {
-            let pick = |k: u32| hash(&[i, step, k]) as usize % 3;
-            let (a, b, c, to) = (pick(0), pick(1), pick(2), pick(3));
-            let kind = hash(&[i, step, 4]) % 24;
-            let profile = Function::Profile(profiles()[pick(5) + usize::from(pick(6) == 0)]);
-            macro_rules! act {
-                ($list:ident) => {{
-                    let [x, y, z] = [a, b, c].map(|k| $list[k].clone());
-                    let result = match kind {
-                        0..6 => BINARY[kind as usize].of_numbers(x, y),
-                        6..12 => x.unary(UNARY[kind as usize - 6]),
-                        12 => x.select(y, z),
-                        13 => x.clamp01(),
-                        14 => x.square(),
-                        15 => x.power(0.7),
-                        16 => x.apply(Function::Quintic),
-                        17 => Arithmetic::distance([x, y, z]),
-                        18 => x.apply(Function::SmoothStep(-1.0, 2.5)),
-                        19 => x.curve(&curve),
-                        20 => x.square().apply(profile),
-                        21 => x.apply(Function::Profile(Profile::Spline)),
-                        22 => x.square().sqrt().apply(Function::OntoSphere(2.0)).mul(y),
-                        _ => x.times(-0.37).plus(y),
-                    };
-                    $list[to] = result;
-                }};
-            }
-            act!(points);
-            act!(forms);
-            act!(full);
-            act!(spans);
-            let point = points[to];
-            let told = || format!("chain {i}, step {step}, operation {kind}: {point}");
-            assert!(holds(&forms[to], e, point), "{}: {:?}", told(), forms[to]);
-            let condensed = full[to].to_reduced::<E>();
-            assert!(holds(&condensed, e, point), "{}: {condensed:?}", told());
-            assert!(
-                point.is_nan() || spans[to].contains(point),
-                "{}: {:?}",
-                told(),
-                spans[to]
-            );
-            if point.is_nan() || point.abs() > 1e6 {
-                break;
-            }
-        }
-    }
-}
-
-#[test]
-fn chains_of_operations_hold_their_points() {
-    chains(12_000);
-}
-
-#[test]
-#[ignore = "long: tests/run --all"]
-fn a_million_operations_hold_their_points() {
-    chains(300_000);
 }
 
 /// Calls with random segments, long and short, and some of their places with t in [−1, 1] of the segment.
@@ -436,85 +247,6 @@ fn slopes_along_segments_hold_every_chord() {
     }
 }
 
-#[test]
-fn every_field_stays_within_its_ranges_over_boxes_and_cells() {
-    for (name, program) in zoo().into_iter().chain(noise_zoo()) {
-        over_cells(&name, &program, 250);
-    }
-}
-
-/// Boxes, their slopes and cells of three symbols against points, `count` times.
-fn over_cells(name: &str, program: &Program, count: u32) {
-    for i in 0..count {
-        let part = |k: u32| number(&[i, k, 41]);
-        let size = scale(&[i, 9, 41]);
-        let centre = [0, 1, 2].map(|k| 2.0 * part(k));
-        let edges = [0, 1, 2].map(|a| [0, 1, 2].map(|k| size * part(10 + 3 * a + k)));
-        let cell = Cell::of_edges(centre, edges);
-        let form = program.over_cell(&cell);
-        let reach = [0, 1, 2].map(|k| {
-            let half: f64 = edges.iter().map(|edge| edge[k].abs()).sum();
-            Interval::point(centre[k]).expand(half)
-        });
-        let zero = Interval::point(0.0);
-        let over = program.over_box(reach, zero, zero);
-        let slopes = program.slopes_over_box(reach, zero, 0.0);
-        for j in 0..8u32 {
-            let e = [0, 1, 2].map(|k| number(&[i, j, k, 42]));
-            let at = [0, 1, 2]
-                .map(|k| centre[k] + e[0] * edges[0][k] + e[1] * edges[1][k] + e[2] * edges[2][k]);
-            let place = Place {
-                at,
-                footprint: 0.0,
-                time: 0.0,
-            };
-            let value = program.at(&place);
-            let told = || format!("{name} at {place:?} of {centre:?} {edges:?}: {value}");
-            assert!(over.contains(value), "{}: {over:?}", told());
-            assert!(slopes.value.contains(value), "{}: {slopes:?}", told());
-            let blur = 1e-14 / size * form.along.iter().map(|x| x.abs()).sum::<f64>();
-            assert!(holds(&form.blurred(blur), e, value), "{}: {form:?}", told());
-            let jet = program.jet(&place);
-            for (slope, exact) in slopes.slopes.iter().zip(jet.gradient) {
-                let room = slope.expand(1e-9 * (1.0 + exact.abs()));
-                assert!(
-                    !exact.is_finite() || room.contains(exact),
-                    "{}: {exact} outside {slope:?}",
-                    told()
-                );
-            }
-        }
-    }
-}
-
-#[test]
-fn cells_of_rays_hold_their_rays() {
-    let (_, program) = zoo()
-        .into_iter()
-        .find(|(name, _)| name.starts_with("spheres"))
-        .unwrap();
-    for i in 0..400u32 {
-        let part = |k: u32| number(&[i, k, 51]);
-        let origin = [0, 1, 2].map(|k| 3.0 * part(k));
-        let direction = [0, 1, 2].map(|k| part(3 + k));
-        let [across, up] = [6, 9].map(|from| [0, 1, 2].map(|k| 0.01 * part(from + k)));
-        let t = Interval::new(1.0 + part(20), 1.0 + part(20) + 0.3 * (1.0 + part(21)));
-        let form = program.over_cell(&Cell::of_rays(origin, [direction, across, up], t));
-        for j in 0..10u32 {
-            let e = [0, 1, 2].map(|k| number(&[i, j, k, 52]));
-            let along = 0.5 * (t.low + t.high) + e[0] * 0.5 * t.width();
-            let at = [0, 1, 2]
-                .map(|k| origin[k] + along * (direction[k] + e[1] * across[k] + e[2] * up[k]));
-            let value = program.at(&Place {
-                at,
-                footprint: 0.0,
-                time: 0.0,
-            });
-            assert!(holds(&form.blurred(1e-13), e, value), "{value}: {form:?}");
-        }
-    }
-}
-
 /// The program's own value and gradient at one place.
 fn evaluated(program: &Program, place: &Place) -> (f64, [f64; 3]) {
     let [x, y, z] = place.at;
@@ -607,54 +339,6 @@ fn hessians_are_the_differences_of_gradients() {
             }
         });
         assert!(seen > 500 && off * share < seen, "{name}: {off} of {seen}");
-    }
-}
-
-#[test]
-fn standard_and_reduced_forms_convert_without_loss() {
-    let form = Reduced {
-        centre: 2.0,
-        along: [0.5, -0.25, 0.125],
-        error: 0.0625,
-    };
-    let back: Reduced<3> = Affine::from_reduced(&form).to_reduced();
-    assert_eq!((back.centre, back.along), (form.centre, form.along));
-    assert!(back.error >= form.error && back.error < form.error * (1.0 + 1e-12));
-    // x − x is 0 where the symbols are known, and 2 errors wide where they are not.
-    let full = Affine::from_reduced(&form);
-    let nothing = full.clone().minus(full).to_reduced::<3>();
-    assert!(nothing.radius() < 1e-13);
-    let apart = form.minus(form);
-    assert!((apart.radius() - 0.125).abs() < 1e-12);
-}
-
-#[test]
-fn long_chains_keep_their_symbols_bounded_and_their_points() {
-    let t = Reduced::of_symbols(0.3, [0.05]);
-    let mut form = Affine::from_reduced(&t);
-    let mut point = 0.3 + 0.05 * 0.7;
-    let (first, start) = (form.clone(), point);
-    for _ in 0..400 {
-        form = form
-            .clone()
-            .mul(first.clone())
-            .plus(form.unary(Unary::Sin).times(0.5));
-        point = point * start + point.value_of_sine() * 0.5;
-        let reduced = form.to_reduced::<1>();
-        assert!(
-            holds(&reduced.blurred(1e-15), [0.7], point),
-            "{point}: {reduced:?}"
-        );
-    }
-}
-
-trait Sine {
-    fn value_of_sine(self) -> f64;
-}
-
-impl Sine for f64 {
-    fn value_of_sine(self) -> f64 {
-        Unary::Sin.value(self)
     }
 }
 
