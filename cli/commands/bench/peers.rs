@@ -78,19 +78,22 @@ pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error>
         skipped: Vec::new(),
         limits: Vec::new(),
     };
-    for (number, row) in (0..).zip(&chosen) {
+    'rows: for (number, row) in (0..).zip(&chosen) {
         progress.update(number, row.name);
         match place.pairs(row) {
             Err(why) => peers.skipped.push(Skipped { row: row.name, why }),
             Ok(pairs) => {
                 for mut pair in pairs {
-                    peers.rows.extend(compared(&mut pair, options.runs, &stop)?);
+                    match compared(&mut pair, options.runs, &stop)? {
+                        Some(row) => peers.rows.push(row),
+                        None => break 'rows,
+                    }
                 }
             }
         }
     }
     // What bounds us is worth its time only where all of the table is wanted.
-    if chosen.len() == ROWS.len() {
+    if chosen.len() == ROWS.len() && !stop.is_set() {
         for (name, scene) in [
             ("sphere-3", SPHERE),
             ("terrain", TERRAIN),
@@ -100,16 +103,20 @@ pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error>
         }
     }
     progress.finish();
+    // Also what was measured before it was stopped.
     output::print(context.output, &peers)?;
+    if stop.is_set() {
+        return Err(Error::interrupted("the measurement was stopped"));
+    }
     Ok(Ending::Done)
 }
 
-/// Both sides, in turns.
+/// Both sides, in turns; `None` if it was stopped before the last one.
 fn compared(pair: &mut Pair<'_>, runs: u32, stop: &Stop) -> Result<Option<Compared>, Error> {
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     for _ in 0..runs {
         if stop.is_set() {
-            return Err(Error::interrupted("the measurement was stopped"));
+            return Ok(None);
         }
         ours.push((pair.ours.turn)()?);
         theirs.push((pair.theirs.turn)()?);

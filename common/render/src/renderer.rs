@@ -204,13 +204,7 @@ impl ImageRenderer {
         for sample in &work.samples {
             let sight = self.view.sight(sample);
             work.sights.push(sight);
-            work.rays.push(Ray {
-                origin: sight.origin,
-                direction: sight.direction,
-                from_eye: DVec3::ZERO,
-                time: sight.time,
-                grid: self.surface.sight,
-            });
+            work.rays.push(self.surface.ray(&sight));
         }
         work.tracer.trace(
             &self.surface,

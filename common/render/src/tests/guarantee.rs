@@ -126,13 +126,7 @@ fn rays(surface: &Surface, view: &View, count: u32) -> Vec<Ray> {
                 place: [400.0 * random(index, 0), 40.0 * random(index, 1)],
                 instant: random(index, 2),
             });
-            Ray {
-                origin: sight.origin,
-                direction: sight.direction,
-                from_eye: DVec3::ZERO,
-                time: sight.time,
-                grid: surface.sight,
-            }
+            surface.ray(&sight)
         })
         .collect()
 }
@@ -215,13 +209,7 @@ fn held_against_the_reference(count: u32) {
                     place,
                     instant: 0.0,
                 });
-                Ray {
-                    origin: sight.origin,
-                    direction: sight.direction,
-                    from_eye: DVec3::ZERO,
-                    time: sight.time,
-                    grid: surface.sight,
-                }
+                surface.ray(&sight)
             })
             .collect();
         let (hits, _) = trace(&surface, Goal::Distance, &rays);
@@ -341,13 +329,7 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
                 });
                 let instant = random(index, 2);
                 let sight = view.sight(&Sample { place, instant });
-                Ray {
-                    origin: sight.origin,
-                    direction: sight.direction,
-                    from_eye: DVec3::ZERO,
-                    time: sight.time,
-                    grid: surface.sight,
-                }
+                surface.ray(&sight)
             })
             .collect();
         let (hits, counts) = trace(&surface, Goal::Distance, &rays);

@@ -6,8 +6,6 @@
 
 use core::sync::atomic::AtomicBool;
 
-use glam::DVec3;
-
 use super::surface::Surface;
 use super::tracer::{Goal, Ray, Tracer};
 use crate::counts::Counts;
@@ -89,13 +87,7 @@ fn rays(surface: &Surface, view: &View) -> Vec<Ray> {
                 place: [x + f64::from(dx), y + f64::from(dy)],
                 instant: 0.0,
             });
-            rays.push(Ray {
-                origin: sight.origin,
-                direction: sight.direction,
-                from_eye: DVec3::ZERO,
-                time: sight.time,
-                grid: surface.sight,
-            });
+            rays.push(surface.ray(&sight));
         }
     }
     rays

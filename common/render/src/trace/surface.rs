@@ -10,8 +10,9 @@ use super::grid::Grid;
 use super::means::{self, Means};
 use super::split::split;
 use super::techniques::Technique;
+use super::tracer::Ray;
 use crate::error::RenderError;
-use crate::view::{Footprint, View};
+use crate::view::{Footprint, Sight, View};
 
 /// Neighbouring points of a camera ray's grid are this share of a footprint apart, or down to half of it.
 const SHARE: f64 = 1.0 / 2.0;
@@ -125,6 +126,17 @@ impl Surface {
             surface.means = means::cheapest(&surface, view, &allowed);
         }
         Ok(surface)
+    }
+
+    /// The camera ray of a sight.
+    pub(crate) fn ray(&self, sight: &Sight) -> Ray {
+        Ray {
+            origin: sight.origin,
+            direction: sight.direction,
+            from_eye: DVec3::ZERO,
+            time: sight.time,
+            grid: self.sight,
+        }
     }
 
     /// The grid of a ray that starts at the surface, at a distance from the eye.
