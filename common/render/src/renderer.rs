@@ -60,7 +60,8 @@ pub struct ImageRenderer {
 }
 
 impl ImageRenderer {
-    /// Compiles image `image` of a scene: programs, bounds, tables of the sky. Takes milliseconds.
+    /// Compiles image `image` of a scene: programs, bounds, tables of the sky; tries how its rays are traced fastest. Takes
+    /// some ten milliseconds.
     pub fn new(
         description: &Description,
         assets: &Assets,

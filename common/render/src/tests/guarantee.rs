@@ -10,6 +10,7 @@ use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
+use crate::trace::means::{self, Means};
 use crate::trace::methods::tests::reference::truth;
 use crate::trace::methods::tests::surfaces::surfaces;
 use crate::trace::methods::{FieldAlong, Wanted};
@@ -339,5 +340,27 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
             assert_eq!(alone[0], *hit, "{name}: {ray:?}");
         }
         assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
+    }
+}
+
+#[test]
+fn rays_that_are_tried_by_each_means_end_however_steep_the_field() {
+    let scene = scenes::needles();
+    let view = View::new(&scene.camera, &scene.film, 0.0);
+    let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+    let rays = means::rays(&surface, &view);
+    for means in [Means::Values, Means::Tangents, Means::Stretches] {
+        let tried = |steps_max| Surface {
+            means,
+            steps_max,
+            ..surface.clone()
+        };
+        let (hits, counts) = trace(&tried(means::STEPS_MAX), Goal::Distance, &rays);
+        assert_eq!(hits.len(), rays.len());
+        assert!(counts.exhausted > 0, "{means:?}: {counts:?}");
+        assert!(
+            counts.steps < rays.len() as u64 * 1_026,
+            "{means:?}: {counts:?}"
+        );
     }
 }

@@ -80,6 +80,24 @@ pub(super) fn hypertexture() -> Description {
     scene
 }
 
+/// A sphere under noise of a micrometre's cells that is seen in so many pixels that its rays have some ten thousand points.
+pub(super) fn needles() -> Description {
+    let mut fields = Fields::new();
+    let sphere = fields.sphere(1.0);
+    let p = fields.position();
+    let plain = [Basis::Plain.number(), 3.0, 2.0, 1.0, 1.0, 0.0, 0.0];
+    let noise = fields.cascade(p, 1e6, 0.3, plain);
+    let field = fields.op(Op::Add, &[sphere, noise], &[]);
+    let bound = Bound::Shell {
+        inner: 0.4,
+        outer: 1.6,
+    };
+    let mut scene = standing(fields.0, field, bound, [0.0, -4.0, 0.6]);
+    scene.film.resolution.width = 20_000;
+    scene.film.window = scene.film.resolution.rect();
+    scene
+}
+
 /// A sphere of radius 1 about the origin, seen from 4 m.
 pub(super) fn sphere() -> Description {
     let mut fields = Fields::new();

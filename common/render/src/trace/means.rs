@@ -40,6 +40,10 @@ const SQUARES: [u32; 2] = [6, 5];
 /// Pixels along the side of a square.
 const SIDE: u32 = 4;
 
+/// Most evaluations along a ray that is tried: where all means need more, it matters little which is taken, and
+/// no field can make preparing an image take long.
+pub(crate) const STEPS_MAX: f64 = 1024.0;
+
 /// The means by which the rays of `view` need least.
 pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Means {
     let rays = rays(surface, view);
@@ -48,6 +52,7 @@ pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Mea
     for &means in allowed {
         let surface = Surface {
             means,
+            steps_max: STEPS_MAX,
             ..surface.clone()
         };
         let (mut counts, mut hits) = (Counts::default(), Vec::new());
@@ -73,7 +78,7 @@ pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Mea
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.
-fn rays(surface: &Surface, view: &View) -> Vec<Ray> {
+pub(crate) fn rays(surface: &Surface, view: &View) -> Vec<Ray> {
     let [width, height] = view.size();
     let mut rays = Vec::new();
     for square in 0..SQUARES[0] * SQUARES[1] {

@@ -28,7 +28,7 @@ use crate::error::Cancelled;
 
 /// Most evaluations along one ray: more than a ray's grid has points within any scene that can be rendered in
 /// a day, so that no answer depends on where a search began. A ray that still is not done counts as a hit where it stands.
-const STEPS_MAX: f64 = 4_194_304.0;
+pub(crate) const STEPS_MAX: f64 = 4_194_304.0;
 
 /// Memory in which rays are searched.
 #[derive(Default)]
@@ -87,7 +87,7 @@ impl Search {
                 let rows = &self.rows;
                 counts.backtracks += u64::from(rows.back[i] > 0.0);
                 let is_found = rows.clear[i] >= rows.inside[i];
-                let is_exhausted = rows.count[i] > STEPS_MAX;
+                let is_exhausted = rows.count[i] > surface.steps_max;
                 if !is_found && !is_exhausted && rows.clear[i] <= rows.end[i] {
                     continue;
                 }

@@ -8,6 +8,7 @@ use scene::description::{Bound, Seed};
 use super::clearance::{Around, Clearances};
 use super::grid::Grid;
 use super::means::{self, Means};
+use super::search::STEPS_MAX;
 use super::split::split;
 use super::techniques::Technique;
 use super::tracer::Ray;
@@ -44,6 +45,8 @@ pub(crate) struct Surface {
     pub(crate) moves: bool,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
+    /// Most evaluations along one ray.
+    pub(crate) steps_max: f64,
     /// A technique that is left out.
     pub(crate) without: Option<Technique>,
 }
@@ -104,6 +107,7 @@ impl Surface {
         let mut surface = Self {
             moves: program.moves(),
             means: Means::Values,
+            steps_max: STEPS_MAX,
             without,
             program,
             level,
