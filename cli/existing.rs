@@ -203,6 +203,7 @@ mod tests {
                 comments: String::new(),
             },
             view: ViewTransform::default(),
+            threads: 1,
         };
         image::finish(&scratch, &request).unwrap();
         scratch.discard().unwrap();

@@ -347,6 +347,12 @@ impl Shared<'_> {
             view: ViewTransform {
                 exposure_stops: plan.description.film.exposure,
             },
+            // The other threads have nothing else to do where nothing is left to start.
+            threads: if self.line.is_empty() {
+                plan.threads
+            } else {
+                1
+            },
         };
         let failed = |error| Error::failed(format!("cannot write frame {image}")).because(error);
         let frame = image::finish(&work.scratch, &request).map_err(failed)?;

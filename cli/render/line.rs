@@ -102,6 +102,12 @@ impl<W> Line<W> {
         None
     }
 
+    /// Whether nothing is left to start.
+    pub(super) fn is_empty(&self) -> bool {
+        let state = self.state();
+        state.waiting.is_empty() && state.open.is_empty() && !state.opening
+    }
+
     /// Hands out nothing more, and forgets what was not started.
     pub(super) fn close(&self) {
         let mut state = self.state();
@@ -185,6 +191,13 @@ mod tests {
             .map(|_| matches!(line.next(), Next::Open(_)))
             .collect();
         assert_eq!(kinds, [false, false, true]);
+        assert!(!line.is_empty());
+        let Next::Block(..) = line.next() else {
+            panic!("a block is left")
+        };
+        assert!(!line.is_empty());
+        assert!(line.opened((), vec![]).is_some());
+        assert!(line.is_empty());
     }
 
     #[test]

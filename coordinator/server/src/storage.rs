@@ -323,6 +323,7 @@ impl Encoding {
                     ..plan.metadata.clone()
                 },
                 view: plan.view,
+                threads: 1,
             };
             image::finish(&scratch, &request).map_err(|error| chain(&error))
         };

@@ -1,6 +1,7 @@
 //! OpenEXR: one part, every channel of the film, tiles of a strip's height, ZIP.
 //!
-//! Tiles are written row by row from strips, through the `exr` crate's block interface.
+//! Tiles are written row by row from strips, through the `exr` crate's block interface. Compressing them is most of
+//! the work, and can be shared by threads; the bytes are the same.
 
 use std::collections::HashMap;
 use std::io::BufWriter;
@@ -23,6 +24,7 @@ use model::{Digest, Rect};
 
 use super::Source;
 use super::publish::Pending;
+use super::share::in_order;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
@@ -37,6 +39,10 @@ const _: () = assert!(
 
 /// Side of a tile: that of a grid square and the height of a strip.
 const TILE: usize = GRID_SQUARE as usize;
+
+/// Tiles that are compressed between two writes, for each thread: what an image's encoding holds in memory
+/// is bounded by them.
+const TILES_A_THREAD: usize = 64;
 
 /// Largest finite half; light beyond it is stored as this, never as infinity.
 const HALF_MAX: f32 = 65_504.0;
@@ -62,13 +68,22 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
         [header(source, &channels)].into_iter().collect(),
         true,
         |meta, chunks| {
+            let threads = source.request.threads.max(1);
+            let mut waiting = Vec::new();
+            let mut write = |waiting: &mut Vec<Tile>| {
+                write_tiles(std::mem::take(waiting), threads, &meta, chunks)
+                    .map_err(|error| refused(pending, error))
+            };
             let result = source.scratch.for_each_strip(|strip| {
                 let lines = encode(strip, &channels);
                 lines.iter().for_each(|line| hasher.samples(line));
-                write_tiles(window, strip.rows().start, &lines, &meta, chunks)
-                    .map_err(|error| refused(pending, error))
+                cut(window, strip.rows().start, &lines, &mut waiting);
+                if waiting.len() >= TILES_A_THREAD * threads {
+                    write(&mut waiting)?;
+                }
+                Ok(())
             });
-            result.map_err(|error| {
+            result.and_then(|()| write(&mut waiting)).map_err(|error| {
                 ours = Some(error);
                 ExrError::Aborted
             })
@@ -78,19 +93,18 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
     Ok(hasher.finish())
 }
 
-/// Compresses and writes the tiles of one strip.
-fn write_tiles(
-    window: Rect,
-    y: u32,
-    lines: &[Vec<u8>],
-    meta: &MetaData,
-    chunks: &mut impl ChunksWriter,
-) -> Result<(), ExrError> {
+/// A tile before it is compressed, and its number in the file.
+struct Tile {
+    number: usize,
+    block: UncompressedBlock,
+}
+
+/// Appends the tiles of one strip.
+fn cut(window: Rect, y: u32, lines: &[Vec<u8>], tiles: &mut Vec<Tile>) {
     let width = window.width() as usize;
     let height = lines.len() / CHANNEL_COUNT;
     let columns = width.div_ceil(TILE);
     let y = (y - window.y0) as usize;
-    let mut compressor = chunks.sequential_blocks_compressor(meta);
     for column in 0..columns {
         let x = column * TILE;
         let tile_width = TILE.min(width - x);
@@ -105,10 +119,25 @@ fn write_tiles(
             pixel_size: Vec2(tile_width, height),
             level: Vec2(0, 0),
         };
-        compressor.compress_block(
-            y / TILE * columns + column,
-            UncompressedBlock { index, data },
-        )?;
+        tiles.push(Tile {
+            number: y / TILE * columns + column,
+            block: UncompressedBlock { index, data },
+        });
+    }
+}
+
+/// Compresses tiles and writes them in their order.
+fn write_tiles(
+    tiles: Vec<Tile>,
+    threads: usize,
+    meta: &MetaData,
+    chunks: &mut impl ChunksWriter,
+) -> Result<(), ExrError> {
+    let compressed = in_order(tiles, threads, |Tile { number, block }| {
+        (number, block.compress_to_chunk(&meta.headers))
+    });
+    for (number, chunk) in compressed {
+        chunks.write_chunk(number, chunk?)?;
     }
     Ok(())
 }

@@ -9,6 +9,7 @@ pub(crate) mod metadata;
 mod png;
 mod ppm;
 pub(crate) mod publish;
+mod share;
 
 use std::path::PathBuf;
 
@@ -36,6 +37,8 @@ pub struct FrameRequest {
     pub metadata: FrameMetadata,
     /// How light becomes colour in PNG and PPM frames.
     pub view: ViewTransform,
+    /// Threads that compress at a time, this one included; nothing of the frames depends on it.
+    pub threads: usize,
 }
 
 /// The frames of one image, in place and durable.

@@ -100,6 +100,7 @@ pub(crate) fn request(folder: &std::path::Path, formats: &str) -> FrameRequest {
             comments: "made by a test".into(),
         },
         view: ViewTransform::default(),
+        threads: 1,
     }
 }
 

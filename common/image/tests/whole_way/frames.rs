@@ -1,9 +1,9 @@
 //! Frames: written, read back, compared.
 
-use image::{FileKind, Format, ImageError, SampleKind, ViewTransform, Window};
+use image::{FileKind, Format, ImageError, SampleKind, Scratch, ViewTransform, Window};
 use image::{compare, file_digest, finish, info};
 use model::film::CHANNELS;
-use model::{Rect, rect::GRID_SQUARE};
+use model::{Rect, Resolution, rect::GRID_SQUARE};
 
 use crate::film::{
     CROP, RESOLUTION, blocks, finished, identity, names, payload, request, value, write_all,
@@ -45,6 +45,41 @@ fn strips_read_back_as_the_film() {
                 };
                 assert_eq!(stored, expected, "{name} at ({x}, {y})");
             }
+        }
+    }
+}
+
+#[test]
+fn threads_make_the_same_file() {
+    // Tiles enough for several turns of each thread.
+    let window = Rect {
+        x0: 0,
+        y0: 0,
+        x1: 450,
+        y1: 400,
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let identity = image::ScratchIdentity {
+        resolution: Resolution {
+            width: 450,
+            height: 400,
+        },
+        ..identity()
+    };
+    let scratch = Scratch::create(folder.path().join("large"), identity, window).unwrap();
+    write_all(&scratch, &blocks(window, 64, 64));
+    let alone = finish(&scratch, &request(folder.path(), "exr")).unwrap();
+    let samples = exr_samples(&alone.files[0].path);
+    for threads in [2, 3] {
+        let request = image::FrameRequest {
+            threads,
+            ..request(folder.path(), "exr")
+        };
+        let shared = finish(&scratch, &request).unwrap();
+        assert_eq!(shared, alone);
+        for ((name, found), (_, expected)) in exr_samples(&alone.files[0].path).iter().zip(&samples)
+        {
+            assert_eq!(found, expected, "{name} with {threads} threads");
         }
     }
 }
