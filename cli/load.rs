@@ -65,6 +65,7 @@ impl SceneOptions {
             "rays": self.rays,
             "crop": crop,
             "set": self.set,
+            "guarantee": render::GUARANTEE,
         })
         .to_string()
     }

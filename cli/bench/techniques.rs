@@ -1,10 +1,10 @@
-//! What each technique of the tracer gains: the same image without it, equal to the bit, and by how much more work.
+//! What each technique of the tracer gains: the same image without it, and by each method; equal to the bit, and by how much more work.
 
 use std::io::{self, Write};
 use std::sync::atomic::AtomicBool;
 
 use model::ImageNumber;
-use render::{Counts, EvalSettings, ImageRenderer, Technique};
+use render::{Counts, EvalSettings, ImageRenderer, Means, Technique};
 use serde::Serialize;
 
 use crate::bench::peers::clock;
@@ -40,48 +40,83 @@ pub(crate) struct Measured {
     pub(crate) evaluations: f64,
     /// CPU seconds with all of them.
     pub(crate) seconds: f64,
-    /// Each left out in turn.
-    pub(crate) without: Vec<Without>,
+    /// The method that this image finds cheapest.
+    pub(crate) method: &'static str,
+    /// Each technique left out in turn.
+    pub(crate) without: Vec<Other>,
+    /// By each method in turn.
+    pub(crate) by: Vec<Other>,
 }
 
-/// A technique that was left out.
+/// The same image in another way.
 #[derive(Serialize, Debug)]
-pub(crate) struct Without {
-    /// Its name.
-    pub(crate) technique: &'static str,
-    /// Evaluations without it over those with all.
+pub(crate) struct Other {
+    /// The technique that was left out, or the method.
+    pub(crate) name: &'static str,
+    /// Evaluations over those with all techniques by the cheapest method.
     pub(crate) evaluations: f64,
-    /// CPU time without it over that with all.
+    /// CPU time over that.
     pub(crate) time: f64,
     /// Whether every value of every pixel is the same.
     pub(crate) is_equal: bool,
 }
 
 impl Measured {
-    /// Renders a scene with all techniques, then without each.
+    /// Renders a scene with all techniques, then without each, then by each method.
     pub(crate) fn of(name: &'static str, scene: &Scene) -> Result<Self, Error> {
-        let (pixels, counts, seconds) = render(scene, None)?;
-        let mut without = Vec::new();
-        for technique in Technique::ALL {
-            let (other, more, longer) = render(scene, Some(technique))?;
-            without.push(Without {
-                technique: technique.name(),
-                evaluations: more.evaluations as f64 / counts.evaluations as f64,
-                time: longer / seconds,
-                is_equal: pixels == other,
-            });
-        }
+        let (reference, method) = render(scene, None, None)?;
+        let other = |name, technique, means| {
+            let (image, _) = render(scene, technique, means)?;
+            Ok(Other {
+                name,
+                evaluations: image.counts.evaluations as f64 / reference.counts.evaluations as f64,
+                time: image.seconds / reference.seconds,
+                is_equal: image.bits == reference.bits,
+            })
+        };
+        let without = Technique::ALL.into_iter();
+        let without = without.map(|technique| other(technique.name(), Some(technique), None));
+        let without = without.collect::<Result<_, Error>>()?;
+        let by = Means::ALL.into_iter();
+        let by = by.map(|means| other(means.name(), None, Some(means)));
+        let by = by.collect::<Result<_, Error>>()?;
+        let counts = &reference.counts;
         Ok(Self {
             scene: name,
             evaluations: counts.evaluations as f64 / (counts.rays + counts.shadow_rays) as f64,
-            seconds,
+            seconds: reference.seconds,
+            method: method.name(),
             without,
+            by,
         })
+    }
+
+    /// Every other way.
+    pub(crate) fn others(&self) -> impl Iterator<Item = &Other> {
+        self.without.iter().chain(&self.by)
     }
 }
 
-/// The bits of image 0's values, what was counted, and CPU seconds.
-fn render(scene: &Scene, without: Option<Technique>) -> Result<(Vec<u32>, Counts, f64), Error> {
+/// An image as it was rendered.
+struct Rendered {
+    /// The bits of its values.
+    bits: Vec<u32>,
+    counts: Counts,
+    /// CPU seconds.
+    seconds: f64,
+}
+
+/// Image 0 without a technique, by a method or the one that it finds cheapest; and which that was.
+fn render(
+    scene: &Scene,
+    without: Option<Technique>,
+    means: Option<Means>,
+) -> Result<(Rendered, Means), Error> {
+    let settings = EvalSettings {
+        means,
+        ..EvalSettings::default()
+    };
+    let mut taken = Means::Values;
     let failed = |error: String| Error::failed("cannot render the scene").because(error);
     let assets = scene.assets();
     let never = AtomicBool::new(false);
@@ -95,9 +130,10 @@ fn render(scene: &Scene, without: Option<Technique>) -> Result<(Vec<u32>, Counts
             scene.description(),
             &assets,
             ImageNumber(0),
-            EvalSettings::default(),
+            settings,
         )
         .map_err(|error| failed(error.to_string()))?;
+        taken = image.means();
         for block in scene.description().film.window.blocks() {
             counts += image
                 .render_block(block, &never, &mut block_pixels)
@@ -106,7 +142,12 @@ fn render(scene: &Scene, without: Option<Technique>) -> Result<(Vec<u32>, Counts
         }
         Ok(())
     })?;
-    Ok((bits, counts, seconds))
+    let rendered = Rendered {
+        bits,
+        counts,
+        seconds,
+    };
+    Ok((rendered, taken))
 }
 
 impl Report for Techniques {
@@ -114,22 +155,26 @@ impl Report for Techniques {
         for scene in &self.scenes {
             writeln!(
                 out,
-                "{}, {1}×{1} pixels: {2:.2} evaluations per ray, {3:.1} ms with all techniques",
+                "{}, {1}×{1} pixels: {2:.2} evaluations per ray, {3:.1} ms with all techniques, by {4}",
                 scene.scene,
                 self.side,
                 scene.evaluations,
-                1e3 * scene.seconds
+                1e3 * scene.seconds,
+                scene.method,
             )?;
-            let mut table = columns(["without", "evaluations", "CPU time", "pixels"]);
-            for without in &scene.without {
-                table.add_row([
-                    without.technique.to_owned(),
-                    format!("{:.2} ×", without.evaluations),
-                    format!("{:.2} ×", without.time),
-                    if without.is_equal { "equal" } else { "differ" }.to_owned(),
-                ]);
+            for (title, others) in [("without", &scene.without), ("by", &scene.by)] {
+                let mut table = columns([title, "evaluations", "CPU time", "pixels"]);
+                for other in others {
+                    table.add_row([
+                        other.name.to_owned(),
+                        format!("{:.2} ×", other.evaluations),
+                        format!("{:.2} ×", other.time),
+                        if other.is_equal { "equal" } else { "differ" }.to_owned(),
+                    ]);
+                }
+                writeln!(out, "{table}")?;
             }
-            writeln!(out, "{table}\n")?;
+            writeln!(out)?;
         }
         Ok(())
     }
@@ -138,9 +183,9 @@ impl Report for Techniques {
         let mut all = self
             .scenes
             .iter()
-            .flat_map(|scene| scene.without.iter().map(move |one| (scene.scene, one)));
+            .flat_map(|scene| scene.others().map(move |one| (scene.scene, one)));
         all.try_for_each(|(scene, one)| {
-            writeln!(out, "{scene} {} {:.2}", one.technique, one.evaluations)
+            writeln!(out, "{scene} {} {:.2}", one.name, one.evaluations)
         })
     }
 }

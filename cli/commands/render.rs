@@ -1,14 +1,16 @@
 //! `flyby render`: renders frames in this process; interrupted, it goes on where it was.
 
 use std::io::{self, Write};
+use std::iter;
 use std::path::PathBuf;
 use std::thread;
 use std::time::Duration;
 
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use image::{Format, FrameMetadata, Opened};
 use model::{Digest, ImageNumber, Resolution};
-use render::{EvalSettings, SimdLevel};
+use render::{Arithmetic, EvalSettings, Means, SimdLevel};
 use serde::Serialize;
 
 use super::job::make_folder;
@@ -54,6 +56,29 @@ pub(crate) struct Render {
     /// Instruction set; pixels do not depend on it [default: the best of this machine].
     #[arg(long, value_name = "LEVEL", help_heading = "How to compute it")]
     simd: Option<SimdLevel>,
+
+    /// How rays find how far they may step; pixels do not depend on it. `auto` tries all that may be fastest on some rays of each image.
+    #[arg(long, value_name = "METHOD", default_value = AUTO, value_parser = methods(), help_heading = "How to compute it")]
+    method: String,
+}
+
+/// The method that chooses.
+const AUTO: &str = "auto";
+
+fn methods() -> PossibleValuesParser {
+    let about = |means| match means {
+        Means::Values => {
+            "speculative sphere tracing (thesis fig. 5.5) by local bounds of the field's change"
+        }
+        Means::Tangents => "also by derivatives along the ray",
+        Means::Stretches => "also by the derivative's range on the stretch ahead",
+        Means::Ranges(Arithmetic::Intervals) => "subdivision (thesis fig. 5.8) by intervals",
+        Means::Ranges(Arithmetic::Affine) => "subdivision by affine forms",
+        Means::Ranges(Arithmetic::Reduced) => "subdivision by reduced affine forms",
+    };
+    let auto = PossibleValue::new(AUTO).help("the cheapest on some rays of each image");
+    let means = Means::ALL.map(|means| PossibleValue::new(means.name()).help(about(means)));
+    iter::once(auto).chain(means).collect::<Vec<_>>().into()
 }
 
 /// `render`.
@@ -140,9 +165,10 @@ pub(crate) fn run(context: &Context, options: &Render) -> Result<Ending, Error> 
         formats,
         tile: options.tile,
         threads: options.threads.unwrap_or_else(processors),
-        settings: options
-            .simd
-            .map_or_else(EvalSettings::default, |level| EvalSettings { level }),
+        settings: EvalSettings {
+            level: options.simd.unwrap_or_else(SimdLevel::best),
+            means: Means::from_name(&options.method),
+        },
         metadata: metadata(&scene, &options.scene),
     };
     let outcome = render(context, &plan, &stop)?;
@@ -170,7 +196,7 @@ pub(crate) fn run(context: &Context, options: &Render) -> Result<Ending, Error> 
         threads: plan.threads,
         statistics: options
             .stats
-            .then(|| Statistics::new(&outcome.counts, &outcome.spent)),
+            .then(|| Statistics::new(&outcome.counts, &outcome.spent, &outcome.methods)),
         movie,
         folder,
     };

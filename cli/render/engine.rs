@@ -4,6 +4,7 @@
 //! render goes on where it was; a finished image is encoded by the thread that rendered
 //! its last block, while the others render the next image.
 
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
@@ -16,11 +17,11 @@ use image::{
     ViewTransform,
 };
 use model::{Digest, ImageNumber, Rect, Resolution};
-use render::{Assets, Counts, EvalSettings, ImageRenderer};
+use render::{Assets, Counts, EvalSettings, ImageRenderer, Means};
 use scene::Description;
 
 use super::line::{Line, Next, last};
-use super::statistics::{Spent, by_name, clock};
+use super::statistics::{Spent, clock, told};
 use crate::error::Error;
 use crate::stop::Stop;
 
@@ -81,6 +82,8 @@ pub(crate) struct Outcome {
     pub(crate) frames: Vec<(ImageNumber, FinishedFrame)>,
     /// Work done in this run.
     pub(crate) counts: Counts,
+    /// How many images were traced by each method.
+    pub(crate) methods: BTreeMap<&'static str, usize>,
     /// Where its time went.
     pub(crate) spent: Spent,
     /// Blocks rendered in this run.
@@ -103,7 +106,7 @@ struct Work {
 
 enum Event {
     Found(ImageNumber, Opened),
-    Finished(ImageNumber, FinishedFrame, Counts),
+    Finished(ImageNumber, FinishedFrame, Counts, Means),
     Failed(Error),
 }
 
@@ -144,6 +147,7 @@ pub(crate) fn render(
     let mut outcome = Outcome {
         frames: Vec::new(),
         counts: Counts::default(),
+        methods: BTreeMap::new(),
         spent: Spent::default(),
         blocks: 0,
         blocks_found: 0,
@@ -203,9 +207,10 @@ fn listen(
             Err(RecvTimeoutError::Timeout) => tell(shared.done(), News::Progress),
             Err(RecvTimeoutError::Disconnected) => return,
             Ok(Event::Found(image, opened)) => tell(shared.done(), News::Found(image, opened)),
-            Ok(Event::Finished(image, frame, counts)) => {
+            Ok(Event::Finished(image, frame, counts, means)) => {
                 tell(shared.done(), News::Frame);
                 outcome.counts += counts;
+                *outcome.methods.entry(means.name()).or_default() += 1;
                 outcome.frames.push((image, frame));
             }
             Ok(Event::Failed(error)) => {
@@ -335,13 +340,14 @@ impl Shared<'_> {
         let plan = self.plan;
         let image = work.image;
         let counts = unpoisoned(work.counts.into_inner());
+        let means = work.renderer.means();
         let request = FrameRequest {
             folder: plan.folder.clone(),
             stem: plan.stem.clone(),
             number: image,
             formats: plan.formats,
             metadata: FrameMetadata {
-                statistics: serde_json::Value::Object(by_name(&counts)).to_string(),
+                statistics: told(&counts, means),
                 ..plan.metadata.clone()
             },
             view: ViewTransform {
@@ -357,7 +363,7 @@ impl Shared<'_> {
         let failed = |error| Error::failed(format!("cannot write frame {image}")).because(error);
         let frame = image::finish(&work.scratch, &request).map_err(failed)?;
         work.scratch.discard().map_err(failed)?;
-        Ok(Event::Finished(image, frame, counts))
+        Ok(Event::Finished(image, frame, counts, means))
     }
 }
 

@@ -196,7 +196,7 @@ mod tests {
             panic!("a block is left")
         };
         assert!(!line.is_empty());
-        assert!(line.opened((), vec![]).is_some());
+        assert!(line.opened(ImageNumber(1), vec![]).is_some());
         assert!(line.is_empty());
     }
 

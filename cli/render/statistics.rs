@@ -2,12 +2,13 @@
 //!
 //! Counts alone also stand in frames: times are never the same twice.
 
+use std::collections::BTreeMap;
 use std::io::{self, Write};
 use std::ops::AddAssign;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use render::{Counts, Times};
+use render::{Counts, Means, Times};
 use serde::Serialize;
 use serde_json::{Map, Value};
 
@@ -61,6 +62,8 @@ pub(crate) struct Statistics {
     /// Everything that was counted, by name.
     #[serde(flatten)]
     counts: Map<String, Value>,
+    /// How many images were traced by each method.
+    methods: BTreeMap<&'static str, usize>,
     /// Averages over all rays, those towards the sun included.
     per_ray: PerRay,
     /// Seconds of each part of the work, summed over the threads.
@@ -87,10 +90,15 @@ struct PerRay {
 
 impl Statistics {
     /// The report of what was counted and measured.
-    pub(crate) fn new(counts: &Counts, spent: &Spent) -> Self {
+    pub(crate) fn new(
+        counts: &Counts,
+        spent: &Spent,
+        methods: &BTreeMap<&'static str, usize>,
+    ) -> Self {
         let parts = spent.seconds();
         Self {
             counts: by_name(counts),
+            methods: methods.clone(),
             per_ray: PerRay::of(counts),
             seconds: parts
                 .iter()
@@ -105,6 +113,11 @@ impl Statistics {
         for (name, count) in &self.counts {
             writeln!(out, "  {name:<20} {count:>16}")?;
         }
+        let methods = self.methods.iter();
+        let methods: Vec<_> = methods
+            .map(|(name, images)| format!("{name} {images}"))
+            .collect();
+        writeln!(out, "  images by method     {:>16}", methods.join(", "))?;
         let PerRay {
             evaluations,
             noise_evaluations,
@@ -151,8 +164,15 @@ impl PerRay {
     }
 }
 
+/// What a frame says of how it was made: counts by name, and the method.
+pub(crate) fn told(counts: &Counts, means: Means) -> String {
+    let mut statistics = by_name(counts);
+    statistics.insert("method".to_owned(), means.name().into());
+    Value::Object(statistics).to_string()
+}
+
 /// Counts by name.
-pub(crate) fn by_name(counts: &Counts) -> Map<String, Value> {
+fn by_name(counts: &Counts) -> Map<String, Value> {
     let named = counts.named().into_iter();
     named
         .map(|(name, count)| (name.to_owned(), count.into()))
@@ -174,7 +194,7 @@ mod tests {
             subdivisions: 1,
             ..Counts::default()
         };
-        let statistics = Statistics::new(&counts, &Spent::default());
+        let statistics = Statistics::new(&counts, &Spent::default(), &BTreeMap::new());
         let per_ray = statistics.per_ray;
         assert_eq!(
             (per_ray.evaluations, per_ray.steps, per_ray.backtracks),
@@ -191,9 +211,10 @@ mod tests {
             encoding: Duration::from_millis(250),
             ..Spent::default()
         };
-        let statistics = Statistics::new(&Counts::default(), &spent);
+        let statistics = Statistics::new(&Counts::default(), &spent, &[("values", 3)].into());
         let json = serde_json::to_value(&statistics).unwrap();
         assert_eq!(json["evaluations"], 0);
+        assert_eq!(json["methods"]["values"], 3);
         assert_eq!(json["seconds"]["encoding"], 0.25);
         assert_eq!(json["seconds"]["shadows"], 0.0);
         let mut table = Vec::new();

@@ -123,10 +123,9 @@ fn techniques_of_the_tracer_gain_work_and_change_no_pixel() {
     for (number, gains) in [(0, "tangents"), (1, "levels by value")] {
         let without = report["scenes"][number]["without"].as_array().unwrap();
         assert!(without.len() >= 8 && without.iter().all(|one| one["is_equal"] == true));
-        let one = without
-            .iter()
-            .find(|one| one["technique"] == gains)
-            .unwrap();
+        let one = without.iter().find(|one| one["name"] == gains).unwrap();
         assert!(one["evaluations"].as_f64().unwrap() > 1.2, "{one}");
+        let by = report["scenes"][number]["by"].as_array().unwrap();
+        assert!(by.len() == 6 && by.iter().all(|one| one["is_equal"] == true));
     }
 }

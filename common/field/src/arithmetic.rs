@@ -164,7 +164,17 @@ pub(crate) fn select(a: f64, b: f64, c: f64) -> f64 {
 /// sign(a) · |a|^exponent (ERRATA row 1232).
 #[inline(always)]
 pub(crate) fn power(exponent: f64, a: f64) -> f64 {
-    let magnitude = libm::pow(a.abs(), exponent);
+    let size = a.abs();
+    // Roots and products are one instruction each and the same on every machine; a power in general takes fifty.
+    let magnitude = if exponent == 0.5 {
+        size.sqrt()
+    } else if exponent == 1.5 {
+        size * size.sqrt()
+    } else if exponent == 2.5 {
+        size * size * size.sqrt()
+    } else {
+        libm::pow(size, exponent)
+    };
     if a < 0.0 { -magnitude } else { magnitude }
 }
 

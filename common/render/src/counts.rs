@@ -48,7 +48,8 @@ counts! {
     steps,
     /// Steps among them that went too far and were taken back.
     backtracks,
-    /// Bundles of rays that went on in smaller ones, or as single rays, since one value no longer served them all.
+    /// Bundles of rays that went on in smaller ones, or as single rays, since one value no longer served them all;
+    /// stretches that were cut in two.
     subdivisions,
     /// Steps along the cones that rays share.
     cone_steps,

@@ -21,7 +21,7 @@ use crate::shade::light::Lit;
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
 use crate::times::{Clock, Part, Stopwatch, Times};
-use crate::trace::{Goal, Hit, Ray, Surface, Technique, Tracer};
+use crate::trace::{Goal, Hit, Means, Ray, Surface, Technique, Tracer};
 use crate::view::{Sight, View};
 
 /// Samples that are worked on together, about: enough to fill batches, few enough for the cache.
@@ -35,13 +35,16 @@ const LIFT: f64 = 0.5;
 pub struct EvalSettings {
     /// The instruction set of the evaluation; every one gives the same bits.
     pub level: SimdLevel,
+    /// How rays find how far they may step; where not given, every image tries some rays by each means and takes the cheapest.
+    pub means: Option<Means>,
 }
 
 impl Default for EvalSettings {
-    /// The fastest level of this machine.
+    /// The fastest level of this machine, and the means that each image finds cheapest.
     fn default() -> Self {
         Self {
             level: SimdLevel::best(),
+            means: None,
         }
     }
 }
@@ -102,7 +105,7 @@ impl ImageRenderer {
         let start = f64::from(image.0) / film.fps;
         let view = View::new(&description.camera, film, start);
         let (start, end) = view.instants();
-        let surface = Surface::without(description, &view, settings.level, technique)?;
+        let surface = Surface::without(description, &view, settings, technique)?;
         let palette = Palette::new(description, assets, Interval::new(start, end))?;
         let up = surface.vertical(view.eye());
         let ground = mean_albedo(&description.surface.material);
@@ -123,6 +126,11 @@ impl ImageRenderer {
             palette,
             shadows: description.sun.shadows,
         })
+    }
+
+    /// By what means its rays are traced.
+    pub fn means(&self) -> Means {
+        self.surface.means
     }
 
     /// Renders the pixels of `block`, any rectangle of the image.

@@ -8,6 +8,7 @@
 
 mod bezier;
 mod cascades;
+mod differences;
 mod grids;
 mod language;
 pub(crate) mod library;

@@ -24,7 +24,7 @@ pub(crate) fn zoo() -> Vec<(String, Program)> {
             g.push(op, &[x, y], &[]).unwrap()
         });
     }
-    for exponent in [0.5, 1.0, 2.0, 3.3] {
+    for exponent in [0.5, 1.0, 1.5, 2.0, 2.5, 3.3] {
         add(&format!("pow {exponent}"), &|g| {
             let [x, ..] = position(g);
             g.push(Op::Power, &[x], &[exponent]).unwrap()

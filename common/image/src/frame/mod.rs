@@ -18,6 +18,7 @@ use model::{Digest, ImageNumber};
 use self::formats::{Format, Formats, frame_name};
 use self::metadata::FrameMetadata;
 use self::publish::{Pending, sync_folder_of};
+use self::share::in_order;
 use crate::error::ImageError;
 use crate::scratch::Scratch;
 use crate::view::ViewTransform;
@@ -37,7 +38,7 @@ pub struct FrameRequest {
     pub metadata: FrameMetadata,
     /// How light becomes colour in PNG and PPM frames.
     pub view: ViewTransform,
-    /// Threads that compress at a time, this one included; nothing of the frames depends on it.
+    /// Threads that encode at a time, about, this one included; nothing of the frames depends on it.
     pub threads: usize,
 }
 
@@ -82,21 +83,17 @@ pub fn finish(scratch: &Scratch, request: &FrameRequest) -> Result<FinishedFrame
         request,
         film_digest: scratch.film_digest()?,
     };
-    let mut written = Vec::new();
-    for format in request.formats.iter() {
-        let name = frame_name(&request.stem, request.number, format);
-        let pending = Pending::create(&request.folder, &name)?;
-        let digest = match format {
-            Format::Exr => exr::write(&source, &pending),
-            Format::Png8 => png::write(&source, &pending, png::Depth::Eight),
-            Format::Png16 => png::write(&source, &pending, png::Depth::Sixteen),
-            Format::Ppm => ppm::write(&source, &pending),
-        }?;
-        let bytes = pending.sync()?;
-        written.push((pending, format, digest, bytes));
-    }
+    let formats: Vec<Format> = request.formats.iter().collect();
+    let written = in_order(formats, request.threads, |format| write(&source, format));
+    let written: Vec<Written> = written.into_iter().collect::<Result<_, _>>()?;
     let mut files = Vec::new();
-    for (pending, format, digest, bytes) in written {
+    for Written {
+        pending,
+        format,
+        digest,
+        bytes,
+    } in written
+    {
         let path = pending.publish()?;
         files.push(FinishedFile {
             path,
@@ -111,6 +108,33 @@ pub fn finish(scratch: &Scratch, request: &FrameRequest) -> Result<FinishedFrame
     Ok(FinishedFrame {
         film_digest: source.film_digest,
         files,
+    })
+}
+
+/// A frame that is whole and durable, and has no name yet.
+struct Written {
+    pending: Pending,
+    format: Format,
+    digest: Digest,
+    bytes: u64,
+}
+
+fn write(source: &Source<'_>, format: Format) -> Result<Written, ImageError> {
+    let request = source.request;
+    let name = frame_name(&request.stem, request.number, format);
+    let pending = Pending::create(&request.folder, &name)?;
+    let digest = match format {
+        Format::Exr => exr::write(source, &pending),
+        Format::Png8 => png::write(source, &pending, png::Depth::Eight),
+        Format::Png16 => png::write(source, &pending, png::Depth::Sixteen),
+        Format::Ppm => ppm::write(source, &pending),
+    }?;
+    let bytes = pending.sync()?;
+    Ok(Written {
+        pending,
+        format,
+        digest,
+        bytes,
     })
 }
 

@@ -1,6 +1,9 @@
 //! Frames: written, read back, compared.
 
-use image::{FileKind, Format, ImageError, SampleKind, Scratch, ViewTransform, Window};
+use image::{
+    FileKind, Format, FrameRequest, ImageError, SampleKind, Scratch, ScratchIdentity,
+    ViewTransform, Window,
+};
 use image::{compare, file_digest, finish, info};
 use model::film::CHANNELS;
 use model::{Rect, Resolution, rect::GRID_SQUARE};
@@ -59,7 +62,7 @@ fn threads_make_the_same_file() {
         y1: 400,
     };
     let folder = tempfile::tempdir().unwrap();
-    let identity = image::ScratchIdentity {
+    let identity = ScratchIdentity {
         resolution: Resolution {
             width: 450,
             height: 400,
@@ -71,7 +74,7 @@ fn threads_make_the_same_file() {
     let alone = finish(&scratch, &request(folder.path(), "exr")).unwrap();
     let samples = exr_samples(&alone.files[0].path);
     for threads in [2, 3] {
-        let request = image::FrameRequest {
+        let request = FrameRequest {
             threads,
             ..request(folder.path(), "exr")
         };

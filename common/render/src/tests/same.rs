@@ -5,7 +5,9 @@ use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use model::{ImageNumber, Rect};
 
 use super::scenes::{self, block, image, renderer};
-use crate::{Assets, Cancelled, EvalSettings, ImageRenderer, RenderError, SimdLevel, Technique};
+use crate::{
+    Assets, Cancelled, EvalSettings, ImageRenderer, Means, RenderError, SimdLevel, Technique,
+};
 
 #[test]
 fn every_level_gives_the_same_bytes_and_counts() {
@@ -14,11 +16,18 @@ fn every_level_gives_the_same_bytes_and_counts() {
             &scene,
             EvalSettings {
                 level: SimdLevel::scalar(),
+                ..EvalSettings::default()
             },
         );
         for level in SimdLevel::all_available() {
             assert!(
-                image(&scene, EvalSettings { level }) == reference,
+                image(
+                    &scene,
+                    EvalSettings {
+                        level,
+                        ..EvalSettings::default()
+                    }
+                ) == reference,
                 "{name} differs at level {level}"
             );
         }
@@ -155,6 +164,26 @@ fn no_technique_of_the_tracer_changes_a_pixel() {
             "{} gains nothing",
             technique.name()
         );
+    }
+}
+
+#[test]
+fn by_all_means_the_pixels_are_the_same() {
+    for (name, scene) in scenes::all() {
+        let (reference, counts) = image(&scene, EvalSettings::default());
+        for means in Means::ALL {
+            let settings = EvalSettings {
+                means: Some(means),
+                ..EvalSettings::default()
+            };
+            let (pixels, more) = image(&scene, settings);
+            let equal = pixels
+                .iter()
+                .zip(&reference)
+                .all(|(a, b)| a.to_bits() == b.to_bits());
+            assert!(equal, "{name} differs by {}", means.name());
+            assert_eq!(results(more), results(counts), "{name}");
+        }
     }
 }
 

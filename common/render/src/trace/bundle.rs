@@ -23,7 +23,7 @@ const SIZES: [usize; 3] = [64, 16, 4];
 fn split(means: Means) -> f64 {
     match means {
         Means::Stretches => 1.0,
-        Means::Tangents | Means::Values => 0.25,
+        Means::Tangents | Means::Values | Means::Ranges(_) => 0.25,
     }
 }
 

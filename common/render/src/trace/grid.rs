@@ -164,6 +164,19 @@ impl Steps {
         f64::from_bits(bits.wrapping_sub(self.last).wrapping_sub(1)) - self.origin
     }
 
+    /// How many points two points are apart; the second is not before the first.
+    pub(crate) fn between(self, from: f64, to: f64) -> u64 {
+        let (from, to) = ((from + self.origin).to_bits(), (to + self.origin).to_bits());
+        to.wrapping_sub(from) / (self.last + 1)
+    }
+
+    /// The point halfway between two by their number, the nearer of two such.
+    pub(crate) fn middle(self, from: f64, to: f64) -> f64 {
+        let bits = (from + self.origin).to_bits();
+        let half = (self.between(from, to) / 2) * (self.last + 1);
+        f64::from_bits(bits.wrapping_add(half)) - self.origin
+    }
+
     /// Whether a point is the first.
     #[inline(always)]
     pub(crate) fn is_first(self, t: f64) -> bool {
@@ -246,6 +259,11 @@ mod tests {
                 assert_eq!(steps.is_first(place), index == 0);
                 if index > 0 {
                     assert_eq!(steps.before(place), grid.place(index - 1));
+                }
+                for apart in [0, 1, 2, 77, 100_000] {
+                    let far = grid.place(index + apart);
+                    assert_eq!(steps.between(place, far), apart.unsigned_abs());
+                    assert_eq!(steps.middle(place, far), grid.place(index + apart / 2));
                 }
                 t *= 1.000_37;
             }

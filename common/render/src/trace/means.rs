@@ -6,33 +6,98 @@
 
 use core::sync::atomic::AtomicBool;
 
+use field::{Interval, Segment};
+
 use super::surface::Surface;
 use super::tracer::{Goal, Ray, Tracer};
 use crate::counts::Counts;
 use crate::sample::Sample;
 use crate::view::View;
 
-/// What a step of the search evaluates.
+/// By what means single rays find how far they may step. None changes a pixel: all end at the same point of the ray's grid.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Means {
-    /// The value: the bound of the field's change does the rest.
+pub enum Means {
+    /// Values, and the bound of the field's change between two places: speculative sphere tracing, thesis fig. 5.5.
     Values,
-    /// Also the derivative along the ray, for the bound of the field's fall below its tangent.
+    /// Also the derivative along the ray, and the bound of the field's fall below its tangent. Values where no such bound is known.
     Tangents,
-    /// Also the range of that derivative on the stretch ahead.
+    /// Also the range of that derivative on the stretch ahead, from every noise at the place. Values where a field has
+    /// operations that cannot be looked ahead of.
     Stretches,
+    /// Ranges over ever shorter stretches, thesis fig. 5.8, in one of three arithmetics.
+    Ranges(Arithmetic),
+}
+
+/// How ranges of a field are computed along a ray.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Arithmetic {
+    /// Intervals, thesis §5.3.1.
+    Intervals,
+    /// Affine forms with a symbol for every rounding, thesis §5.3.2.
+    Affine,
+    /// Affine forms with the ray's symbol and one other, thesis §5.3.3.
+    Reduced,
+}
+
+impl Arithmetic {
+    /// All values of the field on a stretch.
+    pub(crate) fn range(self, surface: &Surface, segment: &Segment) -> Interval {
+        let program = &surface.program;
+        match self {
+            Self::Intervals => program.along_interval(segment),
+            Self::Affine => program.along_affine(segment).interval(),
+            Self::Reduced => program.along_reduced(segment).interval(),
+        }
+    }
 }
 
 impl Means {
+    /// Every means.
+    pub const ALL: [Self; 6] = [
+        Self::Values,
+        Self::Tangents,
+        Self::Stretches,
+        Self::Ranges(Arithmetic::Intervals),
+        Self::Ranges(Arithmetic::Affine),
+        Self::Ranges(Arithmetic::Reduced),
+    ];
+
+    /// What it is called on command lines and in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Values => "values",
+            Self::Tangents => "tangents",
+            Self::Stretches => "stretches",
+            Self::Ranges(Arithmetic::Intervals) => "intervals",
+            Self::Ranges(Arithmetic::Affine) => "affine",
+            Self::Ranges(Arithmetic::Reduced) => "reduced",
+        }
+    }
+
+    /// The means of that name.
+    pub fn from_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|means| means.name() == name)
+    }
+
     /// What a step costs, beside the evaluation of a value.
     fn cost(self) -> f64 {
         match self {
             Self::Values => 1.0,
             Self::Tangents => 1.5,
             Self::Stretches => 2.3,
+            Self::Ranges(_) => 50.0,
         }
     }
 }
+
+/// Where the cheapest of the others costs a ray so many values, ranges are tried too,
+const DEAR: f64 = 200.0;
+
+/// along one of so many rays, since they take so long,
+const FEW: usize = 8;
+
+/// and no longer on any than this many times what it must not cost on average.
+const PATIENCE: f64 = 4.0;
 
 /// Squares of pixels whose rays are tried, across the image and down.
 const SQUARES: [u32; 2] = [6, 5];
@@ -44,37 +109,44 @@ const SIDE: u32 = 4;
 /// no field can make preparing an image take long.
 pub(crate) const STEPS_MAX: f64 = 1024.0;
 
-/// The means by which the rays of `view` need least.
+/// The means by which the rays of `view` need least, of those allowed; ranges where all of them need many.
 pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Means {
     let rays = rays(surface, view);
     let mut tracer = Tracer::default();
     let mut best = (Means::Values, f64::INFINITY);
     for &means in allowed {
-        let surface = Surface {
-            means,
-            steps_max: STEPS_MAX,
-            ..surface.clone()
-        };
-        let (mut counts, mut hits) = (Counts::default(), Vec::new());
-        let never = AtomicBool::new(false);
-        let done = tracer.trace(
-            &surface,
-            Goal::Distance,
-            &rays,
-            &never,
-            &mut counts,
-            &mut hits,
-        );
-        if done.is_err() {
-            continue;
-        }
-        let steps = counts.steps as f64;
-        let cost = (counts.evaluations as f64 - steps) + steps * means.cost();
+        let cost = cost(surface, &mut tracer, &rays, means, STEPS_MAX);
         if cost < best.1 {
             best = (means, cost);
         }
     }
+    if best.1 > DEAR {
+        let ranges = Means::Ranges(Arithmetic::Reduced);
+        let few: Vec<_> = rays.into_iter().step_by(FEW).collect();
+        let steps_max = PATIENCE * best.1 / ranges.cost();
+        if cost(surface, &mut tracer, &few, ranges, steps_max) < best.1 {
+            return ranges;
+        }
+    }
     best.0
+}
+
+/// What a ray costs on average, in evaluations of a value.
+fn cost(surface: &Surface, tracer: &mut Tracer, rays: &[Ray], means: Means, steps_max: f64) -> f64 {
+    let surface = Surface {
+        means,
+        steps_max,
+        ..surface.clone()
+    };
+    let (mut counts, mut hits) = (Counts::default(), Vec::new());
+    let never = AtomicBool::new(false);
+    let goal = Goal::Distance;
+    let done = tracer.trace(&surface, goal, rays, &never, &mut counts, &mut hits);
+    if done.is_err() {
+        return f64::INFINITY;
+    }
+    let steps = counts.steps as f64;
+    ((counts.evaluations as f64 - steps) + steps * means.cost()) / rays.len() as f64
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.

@@ -13,12 +13,14 @@ pub(crate) mod grid;
 pub(crate) mod means;
 pub mod methods;
 pub(crate) mod polish;
+pub(crate) mod ranges;
 pub(crate) mod search;
 pub(crate) mod split;
 pub(crate) mod surface;
 pub(crate) mod techniques;
 pub(crate) mod tracer;
 
+pub use means::{Arithmetic, Means};
 pub(crate) use surface::Surface;
 pub use techniques::Technique;
 pub(crate) use tracer::{Goal, Hit, Ray, Tracer};

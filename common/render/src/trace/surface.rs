@@ -13,6 +13,7 @@ use super::split::split;
 use super::techniques::Technique;
 use super::tracer::Ray;
 use crate::error::RenderError;
+use crate::renderer::EvalSettings;
 use crate::view::{Footprint, Sight, View};
 
 /// Neighbouring points of a camera ray's grid are this share of a footprint apart, or down to half of it.
@@ -59,14 +60,18 @@ impl Surface {
         view: &View,
         level: SimdLevel,
     ) -> Result<Self, RenderError> {
-        Self::without(description, view, level, None)
+        let settings = EvalSettings {
+            level,
+            ..EvalSettings::default()
+        };
+        Self::without(description, view, settings, None)
     }
 
-    /// The same, with a technique left out.
+    /// The same as the settings say, with a technique left out.
     pub(crate) fn without(
         description: &Description,
         view: &View,
-        level: SimdLevel,
+        EvalSettings { level, means }: EvalSettings,
         without: Option<Technique>,
     ) -> Result<Self, RenderError> {
         let surface = &description.surface;
@@ -117,18 +122,22 @@ impl Surface {
             footprint,
             sight,
         };
-        let mut allowed = vec![Means::Values];
         let is_used = |technique: Technique| technique.is_used(without);
-        if surface.clearances.have_tangents() && is_used(Technique::Tangents) {
-            allowed.push(Means::Tangents);
-        }
         let looks_ahead = surface.clearances.have_errors() && surface.program.looks_ahead();
-        if looks_ahead && is_used(Technique::Stretches) {
-            allowed.push(Means::Stretches);
-        }
-        if allowed.len() > 1 {
-            surface.means = means::cheapest(&surface, view, &allowed);
-        }
+        let is_known = |means: &Means| match means {
+            Means::Values | Means::Ranges(_) => true,
+            Means::Tangents => surface.clearances.have_tangents() && is_used(Technique::Tangents),
+            Means::Stretches => looks_ahead && is_used(Technique::Stretches),
+        };
+        surface.means = match means {
+            Some(means) if is_known(&means) => means,
+            Some(_) => Means::Values,
+            None => {
+                let all = [Means::Values, Means::Tangents, Means::Stretches];
+                let allowed: Vec<_> = all.into_iter().filter(is_known).collect();
+                means::cheapest(&surface, view, &allowed)
+            }
+        };
         Ok(surface)
     }
 

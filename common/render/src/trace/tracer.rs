@@ -8,7 +8,9 @@ use glam::DVec3;
 use super::bound;
 use super::bundle::{Bundles, Span};
 use super::grid::Grid;
+use super::means::Means;
 use super::polish::Polish;
+use super::ranges::Ranges;
 use super::search::Search;
 use super::surface::Surface;
 use super::techniques::Technique;
@@ -88,6 +90,7 @@ pub(crate) struct Tracer {
     spans: Vec<Span>,
     bundles: Bundles,
     search: Search,
+    ranges: Ranges,
     polish: Polish,
     /// Memory of evaluations; also counts noises.
     pub(crate) scratch: Scratch,
@@ -147,6 +150,7 @@ impl Tracer {
             spans,
             bundles,
             search,
+            ranges,
             polish,
             scratch,
             stopwatch,
@@ -170,13 +174,17 @@ impl Tracer {
             hits,
         };
         stopwatch.begin(part(Part::Search));
-        search.run(wanted, spans, results, |found, results| {
+        let found = |found, results: Results<'_>| {
             if polish.push(found) {
                 stopwatch.begin(part(Part::Polish));
                 polish.run(wanted, results);
                 stopwatch.begin(part(Part::Search));
             }
-        })?;
+        };
+        match surface.means {
+            Means::Ranges(arithmetic) => ranges.run(wanted, arithmetic, spans, results, found)?,
+            _ => search.run(wanted, spans, results, found)?,
+        }
         stopwatch.begin(part(Part::Polish));
         let results = Results {
             scratch,

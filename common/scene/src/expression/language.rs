@@ -8,6 +8,7 @@ use rhai::{Array, Dynamic, Engine, FLOAT, INT, Map, OptimizationLevel};
 
 use super::Shared;
 use super::cascades::CASCADES;
+use super::differences;
 use super::grids;
 use super::library::LIBRARY;
 use super::noises::NOISES;
@@ -44,6 +45,8 @@ pub(super) const FUNCTIONS: &[&str] = &[
     "spot",
     "wavelet",
     "gradient",
+    "slope",
+    "curvature",
     "warp",
     "length",
     "dot",
@@ -139,6 +142,7 @@ pub(super) fn engine(shared: &Rc<Shared>) -> Engine {
     cascades(&mut engine, shared);
     shapes::register(&mut engine, shared);
     solids::register(&mut engine, shared);
+    differences::register(&mut engine, shared);
     grids::register(&mut engine, shared);
     noises(&mut engine, shared);
     library(&mut engine, shared);

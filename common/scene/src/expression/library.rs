@@ -254,7 +254,7 @@ impl Texture<'_> {
 fn hills(t: &Texture<'_>) -> Made<Dynamic> {
     let sum = t.cascade("fbm", &t.at, 0, &[("hurst", 1.2)])?;
     let raised = t.join(Op::Add, &t.join(Op::Mul, &sum, 0.6)?, 0.5)?;
-    t.shared.power(&raised, &Dynamic::from_float(1.4))
+    t.shared.power(&raised, &Dynamic::from_float(1.5))
 }
 
 /// Where ridges run is moved by a noise twice as large as they are apart.

@@ -268,7 +268,13 @@ fn usage(name: &str) -> String {
         "simplex" | "wavelet" | "gradient_noise" | "value_noise" | "value_gradient_noise" => {
             return format!("it is used like {name}(p) or {name}(p, key)");
         }
-        "gradient" => "gradient(p, #{noise: \"simplex\", key: 3})",
+        "gradient" => {
+            "gradient(p, #{noise: \"simplex\", key: 3}), or gradient(f, 5): of the field f, taken over 5 metres"
+        }
+        "slope" => "slope(f, 5): how steep the field f is, taken over 5 metres",
+        "curvature" => {
+            "curvature(f, 5): above 0 in hollows of the field f, below on ridges, taken over 5 metres"
+        }
         "warp" => "warp(p, #{amount: 0.5, scale: 1, by: \"gradient\"})",
         "weierstrass" => "weierstrass(p, #{octaves: 8, directions: 8, hurst: 0.8})",
         "dot" => "dot(a, b)",

@@ -41,7 +41,10 @@ impl Painter for RenderPainter {
             .iter()
             .map(|(digest, bytes)| (*digest, bytes.clone()))
             .collect();
-        let settings = EvalSettings { level: self.level };
+        let settings = EvalSettings {
+            level: self.level,
+            ..EvalSettings::default()
+        };
         let renderer = ImageRenderer::new(description, &assets, image, settings)
             .map_err(|error| sentence(&error))?;
         Ok(Arc::new(renderer))

@@ -4,7 +4,7 @@ use super::*;
 
 fn functions() -> Vec<Function> {
     let mut all: Vec<Function> = UNARY.into_iter().map(Function::Unary).collect();
-    all.extend([0.3, 0.5, 1.0, 2.0, 3.3].map(Function::Power));
+    all.extend([0.3, 0.5, 1.0, 1.5, 2.0, 2.5, 3.3].map(Function::Power));
     all.extend([
         Function::SmoothStep(-1.0, 2.5),
         Function::Clamp,
