@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::{Args, Subcommand};
+use field::noise::wavelet;
 
 use crate::error::{Ending, Error};
+use crate::noise::copies;
 use crate::noise::measure::{Settings, Statistics, Window, measure};
 use crate::noise::plot::{self, Axis, Curve, Words};
 use crate::noise::report::{Measured, Noise};
@@ -75,6 +77,9 @@ pub(crate) struct Measure {
     out: Option<PathBuf>,
 }
 
+/// Places in each cell at which the making of wavelet noise is drawn.
+const STAGES_SAMPLES: u32 = 16;
+
 /// Most samples of one realisation's square.
 const SAMPLES_MAX: usize = 1 << 22;
 
@@ -134,6 +139,9 @@ impl Measure {
                 maps(folder, name, number, &statistics, &mut measured.plots)?;
             }
             let noise = Noise::new(name.clone(), &statistics);
+            if let Some(folder) = &self.out {
+                building(folder, &stem(name, number), &noise, &mut measured.plots)?;
+            }
             measured.noises.push(noise);
         }
         progress.finish();
@@ -186,6 +194,56 @@ fn cannot_write(path: &Path) -> Error {
     Error::failed(format!("cannot write the plot `{}`", path.display()))
 }
 
+/// What the names of a noise's plots begin with.
+fn stem(name: &str, number: usize) -> String {
+    match PRESETS.iter().any(|preset| preset.name == name) {
+        true => name.to_owned(),
+        false => format!("field{}", number + 1),
+    }
+}
+
+/// Draws what copies of a noise add up to (thesis fig. 4.20), and how wavelet noise is made (fig. 4.21).
+fn building(
+    folder: &Path,
+    stem: &str,
+    noise: &Noise,
+    plots: &mut Vec<PathBuf>,
+) -> Result<(), Error> {
+    let words = Words {
+        title: "Copies of it, each twice as fine and 2^-0.5 as high",
+        x: "wavenumber (cycles per cell)",
+        y: "power density (dB)",
+    };
+    let copies = copies::curves(&noise.line);
+    let drawn = plot::curves(words, Axis::Logarithmic, &copies);
+    write(folder, &format!("{stem}_copies.svg"), drawn, plots)?;
+    if noise.name != "wavelet" {
+        return Ok(());
+    }
+    let stages = wavelet::stages(STAGES_SAMPLES);
+    let curve = |label: &str, values: &[f64]| Curve {
+        label: label.to_owned(),
+        points: stages
+            .places
+            .iter()
+            .copied()
+            .zip(values.iter().copied())
+            .collect(),
+    };
+    let words = Words {
+        title: "How wavelet noise is made: a random spline, its smooth part, and what that lacks",
+        x: "x (lattice cells)",
+        y: "value",
+    };
+    let curves = [
+        curve("random", &stages.random),
+        curve("smooth", &stages.smooth),
+        curve("noise", &stages.detail),
+    ];
+    let drawn = plot::curves(words, Axis::Even, &curves);
+    write(folder, "wavelet_stages.svg", drawn, plots)
+}
+
 /// Draws what each noise has of its own.
 fn maps(
     folder: &Path,
@@ -194,10 +252,7 @@ fn maps(
     statistics: &Statistics,
     plots: &mut Vec<PathBuf>,
 ) -> Result<(), Error> {
-    let stem = match PRESETS.iter().any(|preset| preset.name == name) {
-        true => name.to_owned(),
-        false => format!("field{}", number + 1),
-    };
+    let stem = stem(name, number);
     for (kind, drawn) in [
         ("covariance", plot::covariance(name, &statistics.covariance)),
         ("psdf", plot::spectrum(name, &statistics.plane)),

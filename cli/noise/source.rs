@@ -21,7 +21,62 @@ pub(crate) const PRESETS: &[Preset] = &[
     Preset {
         name: "gradient",
         expression: Some("noise(p, key)"),
-        about: "gradient noise, thesis eq. (4.9)",
+        about: "gradient noise, thesis eq. (4.9) (figs 4.5 to 4.7)",
+    },
+    Preset {
+        name: "value",
+        expression: Some("value_noise(p, key)"),
+        about: "value noise, thesis eq. (4.11)",
+    },
+    Preset {
+        name: "value-gradient",
+        expression: Some("value_gradient_noise(p, key)"),
+        about: "value-gradient noise, thesis eq. (4.12)",
+    },
+    Preset {
+        name: "simplex",
+        expression: Some("simplex(p, key)"),
+        about: "simplex noise, thesis §4.3.2",
+    },
+    Preset {
+        name: "sparse",
+        expression: Some("sparse(p, #{nodes: 1, key: key})"),
+        about: "sparse convolution with a node to a cell, thesis eq. (4.13) (figs 4.10 to 4.12)",
+    },
+    Preset {
+        name: "sparse3",
+        expression: Some("sparse(p, #{nodes: 3, key: key})"),
+        about: "the same with three nodes to a cell",
+    },
+    Preset {
+        name: "sparse-linear",
+        expression: Some(r#"sparse(p, #{nodes: 1, kernel: "linear", key: key})"#),
+        about: "the same with a linear kernel (fig. 4.13)",
+    },
+    Preset {
+        name: "sparse-disc",
+        expression: Some(r#"sparse(p, #{scatter: "disc", key: key})"#),
+        about: "sparse convolution over nodes that keep apart",
+    },
+    Preset {
+        name: "spot",
+        expression: Some("spot(p, #{key: key})"),
+        about: "spot noise, thesis eq. (4.17)",
+    },
+    Preset {
+        name: "cellular",
+        expression: Some("cellular(p, #{key: key})"),
+        about: "the distance to the nearest node, thesis eq. (4.18) (figs 4.15 to 4.17)",
+    },
+    Preset {
+        name: "cellular2",
+        expression: Some("cellular(p, #{weights: [-1, 1], key: key})"),
+        about: "the second distance less the first",
+    },
+    Preset {
+        name: "wavelet",
+        expression: Some("wavelet(p, key)"),
+        about: "wavelet noise, thesis eq. (4.23) (fig. 4.21)",
     },
     Preset {
         name: "white",

@@ -28,12 +28,49 @@ fn a_noise_is_measured_and_plotted() {
     let peak = noises[0]["summary"]["peak"].as_f64().unwrap();
     assert!((0.3..0.7).contains(&peak), "{peak}");
     let plots = json["plots"].as_array().unwrap();
-    assert_eq!(plots.len(), 7, "two maps each, three charts of both");
+    assert_eq!(
+        plots.len(),
+        9,
+        "two maps and a sum of copies each, three charts of both"
+    );
     for plot in plots {
         let svg = std::fs::read_to_string(place.path(plot.as_str().unwrap())).unwrap();
         assert!(svg.starts_with("<svg"), "{plot}");
         assert!(svg.contains("cell"), "{plot}: an axis without its unit");
     }
+}
+
+#[test]
+fn every_noise_of_chapter_4_has_a_name() {
+    let place = Place::new();
+    let names = [
+        "value",
+        "value-gradient",
+        "simplex",
+        "sparse",
+        "sparse3",
+        "sparse-linear",
+        "sparse-disc",
+        "spot",
+        "cellular",
+        "cellular2",
+        "wavelet",
+    ];
+    let mut args = vec!["noise", "measure", "-o", "plots", "--output", "json"];
+    args.extend(names);
+    args.extend(QUICK);
+    let (json, _) = place.ends(0, &args);
+    let json: Value = serde_json::from_str(&json).unwrap();
+    for (noise, name) in json["noises"].as_array().unwrap().iter().zip(names) {
+        assert_eq!(noise["name"], name);
+        assert_eq!(noise["varied"], "by_key", "{name}");
+        assert!(
+            noise["values"]["variance"].as_f64().unwrap() > 1e-4,
+            "{name}"
+        );
+    }
+    let stages = std::fs::read_to_string(place.path("plots/wavelet_stages.svg")).unwrap();
+    assert!(stages.contains("lattice cells"));
 }
 
 #[test]

@@ -24,7 +24,7 @@ pub mod sparse;
 pub mod spot;
 #[cfg(test)]
 mod tests;
-pub(crate) mod wavelet;
+pub mod wavelet;
 
 pub use gradient::{BEND, RANGE, ROUNDING, SLOPE, noise, noise_gradient};
 pub(crate) use gradient::{

@@ -68,6 +68,48 @@ impl Tile {
     }
 }
 
+/// How wavelet noise comes about, shown on one line (thesis fig. 4.21): functions at the same places.
+#[derive(Clone, PartialEq, Debug)]
+pub struct Stages {
+    /// The places, in lattice cells.
+    pub places: Vec<f64>,
+    /// g: B-splines with independent Gaussian coefficients.
+    pub random: Vec<f64>,
+    /// ḡ: as much of it as B-splines twice as wide can say.
+    pub smooth: Vec<f64>,
+    /// f = g − ḡ, the noise, (4.23).
+    pub detail: Vec<f64>,
+}
+
+/// The first row of the noise's coefficients as a noise of one dimension, over its period, at `samples` places a cell.
+pub fn stages(samples: u32) -> Stages {
+    let random: Vec<f64> = (0u32..).take(SIDE).map(gaussian).collect();
+    let smooth = filtered(&random, 1, &detail_filter());
+    let detail: Vec<f64> = random
+        .iter()
+        .zip(&smooth)
+        .map(|(b, lost)| b - lost)
+        .collect();
+    let samples = if samples > 0 { samples } else { 1 };
+    let places = |cell: u32| (0..samples).map(move |i| (cell, f64::from(i) / f64::from(samples)));
+    let all: Vec<(u32, f64)> = (0u32..).take(SIDE).flat_map(places).collect();
+    let along = |b: &[f64]| -> Vec<f64> {
+        let at = |&(cell, t): &(u32, f64)| {
+            let coefficient = |step: usize| b[(cell as usize + SIDE + step - 1) % SIDE];
+            let s = 1.0 - t;
+            let weights = [0.5 * (s * s), 0.5 + t * s, 0.5 * (t * t)];
+            (0..3).map(|step| weights[step] * coefficient(step)).sum()
+        };
+        all.iter().map(at).collect()
+    };
+    Stages {
+        random: along(&random),
+        smooth: along(&smooth),
+        detail: along(&detail),
+        places: all.iter().map(|&(cell, t)| f64::from(cell) + t).collect(),
+    }
+}
+
 /// No value is farther from zero: the B-splines are positive and add up to 1.
 pub(crate) fn range() -> f64 {
     Tile::shared().highest
@@ -291,6 +333,32 @@ mod tests {
                 .abs()
                 < 1e-6
         );
+    }
+
+    #[test]
+    fn the_stages_add_up_and_the_smooth_one_is_a_spline_twice_as_wide() {
+        let Stages {
+            places,
+            random,
+            smooth,
+            detail,
+        } = stages(8);
+        assert_eq!((places.len(), places[9]), (SIDE * 8, 1.125));
+        for i in 0..places.len() {
+            assert!((smooth[i] + detail[i] - random[i]).abs() < 1e-12);
+        }
+        // Within two cells it is one parabola: its third differences are 0. The noise's are not.
+        let third = |f: &[f64], i: usize| (f[i + 3] - 3.0 * f[i + 2] + 3.0 * f[i + 1] - f[i]).abs();
+        let least = |f: &[f64]| {
+            let across = |phase: usize| {
+                (0..SIDE / 2 - 1)
+                    .map(|pair| third(f, (2 * pair + phase) * 8 + 6))
+                    .fold(0.0, f64::max)
+            };
+            f64::min(across(0), across(1))
+        };
+        assert!(least(&smooth) < 1e-12, "{}", least(&smooth));
+        assert!(least(&detail) > 1e-3, "{}", least(&detail));
     }
 
     #[test]
