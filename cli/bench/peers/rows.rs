@@ -109,7 +109,10 @@ pub(crate) const TERRAIN: Ours = Ours::new(include_str!("../../../scenes/pov-ter
 /// The same with shadows.
 pub(crate) const TERRAIN_SHADOWS: Ours = TERRAIN.set(&["sun.shadows=true"]);
 
-/// The same on a planet.
+/// A union of bodies, each with a noise of its own.
+pub(crate) const STONES: Ours = Ours::new(include_str!("../../../scenes/stones.toml"));
+
+/// The terrain on a planet.
 pub(crate) const PLANET: Ours = Ours::new(include_str!("../../../benches/peers/planet.toml"));
 
 /// The same from a moving camera, with many rays per pixel.

@@ -7,6 +7,7 @@ mod code;
 mod fold;
 mod machine;
 pub(crate) mod plan;
+mod simplify;
 mod slopes;
 
 #[cfg(test)]

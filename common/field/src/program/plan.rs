@@ -95,7 +95,7 @@ impl Plan {
     }
 
     /// The same plan without the steps that no root needs.
-    fn live(self) -> Self {
+    pub(crate) fn live(self) -> Self {
         let mut needed = vec![false; self.steps.len()];
         for &root in &self.roots {
             needed[root] = true;

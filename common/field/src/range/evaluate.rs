@@ -62,17 +62,31 @@ impl Cell {
     }
 
     /// The places origin + t (direction + e₂ across + e₃ up), t in the interval, thesis eq. (7.11): the first symbol is along t.
-    pub fn of_rays(origin: [f64; 3], [direction, across, up]: [[f64; 3]; 3], t: Interval) -> Self {
+    pub fn of_rays(
+        origin: [Interval; 3],
+        [direction, across, up]: [[f64; 3]; 3],
+        t: Interval,
+    ) -> Self {
         let half = 0.5 * t.width();
         let t = Reduced::of_symbols(0.5 * (t.low + t.high), [half, 0.0, 0.0]);
         let at = [0, 1, 2].map(|axis| {
             let ray = Reduced::of_symbols(direction[axis], [0.0, across[axis], up[axis]]);
-            t.mul(ray).plus(Reduced::constant(origin[axis]))
+            t.mul(ray).plus(Reduced::any(origin[axis]))
         });
         Self {
             at,
             footprint: Interval::point(0.0),
             time: 0.0,
+        }
+    }
+}
+
+impl Cell {
+    fn ground(&self) -> Ground<Reduced<3>> {
+        Ground {
+            at: self.at,
+            footprint: self.footprint,
+            time: Reduced::constant(self.time),
         }
     }
 }
@@ -107,13 +121,19 @@ struct Ground<T> {
 }
 
 impl<T: Arithmetic> Ground<T> {
-    /// The value of the plan's first root; a plan without one is nowhere inside.
-    fn first(&self, plan: &Plan) -> T {
+    /// The value of every step of a plan.
+    fn all(&self, plan: &Plan) -> Vec<Value<T>> {
         let mut values: Vec<Value<T>> = Vec::with_capacity(plan.steps.len());
         for step in &plan.steps {
             let value = self.step(step, &values);
             values.push(value);
         }
+        values
+    }
+
+    /// The value of the plan's first root; a plan without one is nowhere inside.
+    fn first(&self, plan: &Plan) -> T {
+        let values = self.all(plan);
         match plan.roots.first() {
             Some(&root) => values[root].scalar(),
             None => T::constant(f64::INFINITY),
@@ -352,11 +372,12 @@ impl Program {
 
     /// The first root over a cell as a reduced affine form of four symbols (thesis eq. (7.11)).
     pub fn over_cell(&self, cell: &Cell) -> Reduced<3> {
-        let ground = Ground {
-            at: cell.at,
-            footprint: cell.footprint,
-            time: Reduced::constant(cell.time),
-        };
-        ground.first(&self.plan)
+        cell.ground().first(&self.plan)
+    }
+
+    /// The first component of every step over a cell.
+    pub(crate) fn steps_over_cell(&self, cell: &Cell) -> Vec<Reduced<3>> {
+        let all = cell.ground().all(&self.plan);
+        all.iter().map(Value::scalar).collect()
     }
 }

@@ -92,6 +92,15 @@ impl Blend {
         ends.expand(self.rounding(a, b))
     }
 
+    /// Of a local blend, whether it joins by the smaller number, and how far apart the two must be for it to be just that.
+    pub(crate) fn local(&self) -> Option<(bool, f64)> {
+        match self.kind {
+            Kind::LocalUnion => Some((true, self.size)),
+            Kind::LocalIntersection => Some((false, self.size)),
+            Kind::RicciUnion | Kind::RicciIntersection => None,
+        }
+    }
+
     /// How many times the larger change of the two the result can change.
     ///
     /// A Ricci union's two derivatives are s^{(a+1)/a} of shares s that sum to 1, so they sum to at most 1;

@@ -7,7 +7,7 @@ use crate::{EvalSettings, REVISION};
 const BLESSED: u32 = 3;
 
 /// BLAKE3 of the planes of every small scene, f32 little-endian.
-const DIGESTS: [(&str, &str); 6] = [
+const DIGESTS: [(&str, &str); 7] = [
     (
         "sphere",
         "a97d2f9ca84f7d315a10d9d384c5d87765f22c8d5c8c7c00e0ae45eee261c4fc",
@@ -31,6 +31,10 @@ const DIGESTS: [(&str, &str); 6] = [
     (
         "cube",
         "666de9bc344f78af424f6959034fbe5c4e358d5857fb9c9809b686c94c158dbf",
+    ),
+    (
+        "bodies",
+        "e726c90017453619a1a959bf2a1a45977acad7c4709b545789d275014f6dfe10",
     ),
 ];
 

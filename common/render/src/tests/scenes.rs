@@ -98,6 +98,37 @@ pub(super) fn needles() -> Description {
     scene
 }
 
+/// Five balls beside each other, each with a noise of its own that is held back on its lower half.
+pub(super) fn bodies() -> Description {
+    let mut fields = Fields::new();
+    let p = fields.position();
+    let z = fields.op(Op::Z, &[p], &[]);
+    let share = fields.op(Op::SmoothStep, &[z], &[0.0, 0.2]);
+    let mut all = None;
+    for (i, key) in (-2..=2).map(f64::from).zip([1.0, 2.0, 3.0, 4.0, 5.0]) {
+        let parts = [0.55 * i, 0.0, 0.0].map(|part| fields.number(part));
+        let centre = fields.op(Op::Vector, &parts, &[]);
+        let from = fields.op(Op::VectorSub, &[p, centre], &[]);
+        let length = fields.op(Op::Length, &[from], &[]);
+        let radius = fields.number(0.25);
+        let ball = fields.op(Op::Sub, &[length, radius], &[]);
+        let plain = [Basis::Plain.number(), key, 2.0, 1.0, 4.0, 0.0, 0.0];
+        let bumps = fields.cascade(p, 6.0, 0.08, plain);
+        let bumps = fields.op(Op::Mul, &[share, bumps], &[]);
+        let body = fields.op(Op::Add, &[ball, bumps], &[]);
+        all = Some(match all {
+            None => body,
+            Some(before) => fields.op(Op::Min, &[before, body], &[]),
+        });
+    }
+    let bound = Bound::Box {
+        min: [-1.6, -0.6, -0.6],
+        max: [1.6, 0.6, 0.6],
+    };
+    let field = all.expect("there are five");
+    standing(fields.0, field, bound, [0.0, -4.0, 0.3])
+}
+
 /// A sphere of radius 1 about the origin, seen from 4 m.
 pub(super) fn sphere() -> Description {
     let mut fields = Fields::new();
@@ -242,7 +273,7 @@ pub(super) fn orthographic(graph: Graph, field: NodeId, outer: f64) -> Descripti
 }
 
 /// Every small scene, by name.
-pub(super) fn all() -> [(&'static str, Description); 6] {
+pub(super) fn all() -> [(&'static str, Description); 7] {
     [
         ("sphere", sphere()),
         ("plane", plane()),
@@ -250,6 +281,7 @@ pub(super) fn all() -> [(&'static str, Description); 6] {
         ("ridges", ridges()),
         ("planet", planet()),
         ("cube", cube()),
+        ("bodies", bodies()),
     ]
 }
 

@@ -15,6 +15,7 @@ pub mod methods;
 pub(crate) mod polish;
 pub(crate) mod ranges;
 pub(crate) mod search;
+pub(crate) mod simplify;
 pub(crate) mod split;
 pub(crate) mod surface;
 pub(crate) mod techniques;

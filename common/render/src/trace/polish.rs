@@ -21,6 +21,17 @@ pub(crate) struct Found {
     pub(crate) outside: End,
 }
 
+impl Found {
+    /// The same where the value outside is not known.
+    pub(crate) fn without_outside(self) -> Self {
+        let outside = End {
+            t: f64::NEG_INFINITY,
+            value: 0.0,
+        };
+        Self { outside, ..self }
+    }
+}
+
 /// Memory in which roots are polished.
 #[derive(Default)]
 pub(crate) struct Polish {

@@ -72,16 +72,14 @@ impl Ranges {
                     hits[span.ray] = Hit::Surface(inside.t);
                 }
                 Outcome::Inside(inside) => {
+                    // The point before it was not evaluated.
                     let one = Found {
                         ray: span.ray,
                         steps: ray.grid.steps(),
                         inside,
-                        // Its value is not known: polishing asks for it.
-                        outside: End {
-                            t: f64::NEG_INFINITY,
-                            value: 0.0,
-                        },
-                    };
+                        outside: End::default(),
+                    }
+                    .without_outside();
                     let results = Results {
                         scratch,
                         counts,

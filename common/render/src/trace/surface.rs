@@ -1,5 +1,7 @@
 //! The surface of one image, ready to be traced.
 
+use std::sync::Arc;
+
 use field::{Interval, Points, Program, Scratch, SimdLevel};
 use glam::DVec3;
 use scene::Description;
@@ -33,7 +35,7 @@ pub(crate) struct Surface {
     /// How it is evaluated.
     pub(crate) level: SimdLevel,
     /// How far rays may step.
-    pub(crate) clearances: Clearances,
+    pub(crate) clearances: Arc<Clearances>,
     /// Where it can be.
     pub(crate) bound: Bound,
     /// What heights are measured from.
@@ -48,6 +50,8 @@ pub(crate) struct Surface {
     pub(crate) means: Means,
     /// Most evaluations along one ray.
     pub(crate) steps_max: f64,
+    /// Whether its program has been simplified, so that values outside are not those of the field.
+    pub(crate) is_partial: bool,
     /// A technique that is left out.
     pub(crate) without: Option<Technique>,
 }
@@ -102,7 +106,7 @@ impl Surface {
             travel: view.travel(),
             without,
         };
-        let clearances = Clearances::new(&around, nearest(&program, level, view));
+        let clearances = Arc::new(Clearances::new(&around, nearest(&program, level, view)));
         let sight = if footprint.angle > 0.0 {
             Grid::from_eye(footprint.angle * SHARE)
         } else {
@@ -113,6 +117,7 @@ impl Surface {
             moves: program.moves(),
             means: Means::Values,
             steps_max: STEPS_MAX,
+            is_partial: false,
             without,
             program,
             level,

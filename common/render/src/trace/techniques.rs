@@ -19,6 +19,8 @@ pub enum Technique {
     Levels,
     /// Bounds are tabled by the distance from the eye, where footprints cut octaves off.
     Distances,
+    /// What of the field cannot matter to the rays of a few pixels is left out of their program.
+    Choices,
     /// Samples are followed along a Morton curve.
     Curve,
     /// Samples are followed by slices of the shutter.
@@ -27,7 +29,7 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Bundles,
         Self::Tangents,
         Self::Stretches,
@@ -35,6 +37,7 @@ impl Technique {
         Self::Growth,
         Self::Levels,
         Self::Distances,
+        Self::Choices,
         Self::Curve,
         Self::Slices,
     ];
@@ -49,6 +52,7 @@ impl Technique {
             Self::Growth => "known growth",
             Self::Levels => "levels by value",
             Self::Distances => "tables by distance",
+            Self::Choices => "simplified programs",
             Self::Curve => "Morton curve",
             Self::Slices => "shutter slices",
         }

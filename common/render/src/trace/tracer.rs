@@ -9,9 +9,10 @@ use super::bound;
 use super::bundle::{Bundles, Span};
 use super::grid::Grid;
 use super::means::Means;
-use super::polish::Polish;
+use super::polish::{Found, Polish};
 use super::ranges::Ranges;
 use super::search::Search;
+use super::simplify;
 use super::surface::Surface;
 use super::techniques::Technique;
 use crate::counts::Counts;
@@ -112,26 +113,39 @@ impl Tracer {
         counts: &mut Counts,
         hits: &mut Vec<Hit>,
     ) -> Result<(), Cancelled> {
-        for rays in rays.chunks(TOGETHER) {
+        let has_choices = goal == Goal::Distance && simplify::has_choices(surface);
+        let together = if has_choices {
+            simplify::TOGETHER
+        } else {
+            TOGETHER
+        };
+        for rays in rays.chunks(together) {
             if cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
             let first = hits.len();
             hits.resize(first + rays.len(), Hit::None);
+            let simplified = if has_choices {
+                simplify::for_rays(surface, rays)
+            } else {
+                None
+            };
             let wanted = Wanted {
-                surface,
+                surface: simplified.as_ref().unwrap_or(surface),
                 goal,
                 rays,
                 cancel,
             };
-            self.trace_together(wanted, counts, &mut hits[first..])?;
+            self.trace_together(wanted, surface, counts, &mut hits[first..])?;
         }
         Ok(())
     }
 
+    /// Traces rays, and polishes with the `whole` surface.
     fn trace_together(
         &mut self,
         wanted: Wanted<'_>,
+        whole: &Surface,
         counts: &mut Counts,
         hits: &mut [Hit],
     ) -> Result<(), Cancelled> {
@@ -174,10 +188,19 @@ impl Tracer {
             hits,
         };
         stopwatch.begin(part(Part::Search));
-        let found = |found, results: Results<'_>| {
+        let polished = Wanted {
+            surface: whole,
+            ..wanted
+        };
+        let found = |found: Found, results: Results<'_>| {
+            let found = if surface.is_partial {
+                found.without_outside()
+            } else {
+                found
+            };
             if polish.push(found) {
                 stopwatch.begin(part(Part::Polish));
-                polish.run(wanted, results);
+                polish.run(polished, results);
                 stopwatch.begin(part(Part::Search));
             }
         };
@@ -191,7 +214,7 @@ impl Tracer {
             counts,
             hits,
         };
-        polish.run(wanted, results);
+        polish.run(polished, results);
         Ok(())
     }
 }

@@ -66,7 +66,11 @@ fn cells_of_rays_hold_their_rays() {
         let direction = [0, 1, 2].map(|k| part(3 + k));
         let [across, up] = [6, 9].map(|from| [0, 1, 2].map(|k| 0.01 * part(from + k)));
         let t = Interval::new(1.0 + part(20), 1.0 + part(20) + 0.3 * (1.0 + part(21)));
-        let form = program.over_cell(&Cell::of_rays(origin, [direction, across, up], t));
+        let form = program.over_cell(&Cell::of_rays(
+            origin.map(Interval::point),
+            [direction, across, up],
+            t,
+        ));
         for j in 0..10u32 {
             let e = [0, 1, 2].map(|k| number(&[i, j, k, 52]));
             let along = 0.5 * (t.low + t.high) + e[0] * 0.5 * t.width();
