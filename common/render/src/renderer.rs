@@ -1,6 +1,7 @@
 //! Renders blocks of one image.
 
 use core::sync::atomic::AtomicBool;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use field::{BATCH, Interval, SimdLevel};
 use glam::DVec3;
@@ -60,6 +61,8 @@ pub struct ImageRenderer {
     shadows: bool,
     /// Parts of the shutter whose samples are followed together.
     slices: u32,
+    /// Memory of blocks that are done, for those to come: no more than there are threads at it.
+    spare: Mutex<Vec<Box<Work>>>,
 }
 
 impl ImageRenderer {
@@ -125,6 +128,7 @@ impl ImageRenderer {
             surface,
             palette,
             shadows: description.sun.shadows,
+            spare: Mutex::default(),
         })
     }
 
@@ -168,8 +172,9 @@ impl ImageRenderer {
         pixels: &mut Vec<f32>,
         clock: Option<Clock>,
     ) -> Result<(Counts, Times), Cancelled> {
-        let mut work = Work::default();
+        let mut work = self.spare().pop().unwrap_or_default();
         work.tracer.stopwatch = Stopwatch::new(clock);
+        work.tracer.scratch.noise_evaluations = 0;
         let mut counts = Counts::default();
         let mut film = Film::new(block, pixels);
         let per_pixel = self.strata.per_pixel();
@@ -198,7 +203,13 @@ impl ImageRenderer {
         }
         counts.noise_evaluations += work.tracer.scratch.noise_evaluations;
         work.tracer.stopwatch.stop();
-        Ok((counts, work.tracer.stopwatch.times))
+        let times = work.tracer.stopwatch.times;
+        self.spare().push(work);
+        Ok((counts, times))
+    }
+
+    fn spare(&self) -> MutexGuard<'_, Vec<Box<Work>>> {
+        self.spare.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// Follows all samples of `work` into the scene.
