@@ -9,6 +9,7 @@ mod machine;
 pub(crate) mod plan;
 mod simplify;
 mod slopes;
+mod walk;
 
 #[cfg(test)]
 mod bound_tests;
@@ -25,7 +26,7 @@ use crate::simd::SimdLevel;
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
 pub(crate) use ahead::Ahead;
-pub use ahead::Errors;
+pub use ahead::Outlook;
 pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
@@ -39,6 +40,7 @@ pub(crate) use slopes::Slopes;
 pub struct Program {
     pub(crate) plan: Plan,
     code: Code,
+    walks: bool,
 }
 
 /// Why a graph could not be compiled.
@@ -66,7 +68,12 @@ impl Program {
     pub fn compile(graph: &Graph, roots: &[NodeId], time: Interval) -> Result<Self, CompileError> {
         let plan = Plan::new(graph, roots, time)?;
         let code = Code::new(&plan)?;
-        Ok(Self { plan, code })
+        Ok(Self::of_code(plan, code))
+    }
+
+    fn of_code(plan: Plan, code: Code) -> Self {
+        let walks = walk::is_walked(&code);
+        Self { plan, code, walks }
     }
 
     /// Whether its values change over the time that it was compiled for.
@@ -197,13 +204,19 @@ impl Program {
 
     /// Whether [`Program::evaluate_ahead`] can bound the first root.
     pub fn looks_ahead(&self) -> bool {
-        ahead::bounds(&self.code)
+        self.walks() || ahead::bounds(&self.code)
+    }
+
+    /// Whether [`Program::evaluate_ahead`] goes on, whatever the guess, as far as the first root is positive: so it
+    /// is where that is blobs alone, of a place that moves evenly along straight rays.
+    pub fn walks(&self) -> bool {
+        self.walks
     }
 
     /// [`Program::evaluate_along`], and how far ahead of each place along its direction the first root is positive.
     ///
     /// `ahead` holds a first guess of that for each place, and then a distance that is proven, 0 if nothing is;
-    /// it may be a few times the guess. It is proven for values as they are computed.
+    /// it may be a few times the guess, or up to the limit if the program [walks](Self::walks). It is proven for values as they are computed.
     ///
     /// # Panics
     /// If the slices differ in length or are longer than a batch, or if the program does not look ahead.
@@ -212,15 +225,16 @@ impl Program {
         level: SimdLevel,
         points: &Points<'_>,
         direction: [&[f64]; 3],
-        errors: Errors<'_>,
+        outlook: Outlook<'_>,
         scratch: &mut Scratch,
         [value, slope, ahead]: [&mut [f64]; 3],
     ) {
         let n = points.len();
         assert!(
             n <= BATCH
-                && [&*value, &*slope, &*ahead, errors.offset, errors.slope]
+                && [&*value, &*slope, &*ahead]
                     .iter()
+                    .chain(&[outlook.offset, outlook.slope, outlook.limit])
                     .chain(&direction)
                     .all(|slice| slice.len() == n),
             "the slices are as long as the batch, and that is one"
@@ -241,7 +255,10 @@ impl Program {
         stretches.prepare(&self.code);
         dispatch!(level.token(), simd => {
             along.run(simd, &self.code, points, 0, noise_evaluations);
-            stretches.run(simd, &self.code, along, errors, root, ahead);
+            match walk::blobs(&self.code) {
+                Some(blobs) if self.walks => walk::run(simd, blobs, along, root, outlook, ahead),
+                _ => stretches.run(simd, &self.code, along, outlook, root, ahead),
+            }
         });
         let duals = along.register(root);
         numbers(value, &duals.value, f64::INFINITY);

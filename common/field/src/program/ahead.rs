@@ -25,13 +25,16 @@ use lanes::{Stretches, WIDTH, row};
 use octaves::{Growth, Octaves};
 use stretch::{Stretch, least, most};
 
-/// What the field's values and derivatives may be wrong by, lane by lane; of [`crate::Taylor`].
+/// What is known of the field and wanted of the rays, lane by lane.
 #[derive(Clone, Copy, Debug)]
-pub struct Errors<'a> {
-    /// In the field's unit: rounding of its values.
+pub struct Outlook<'a> {
+    /// What values may be wrong by, in the field's unit: rounding; of [`crate::Taylor`].
     pub offset: &'a [f64],
-    /// In the field's unit per metre: rounding of the derivative, and what levels of detail change.
+    /// What derivatives may be wrong by, in the field's unit per metre: rounding, and what levels of detail
+    /// change; of [`crate::Taylor`].
     pub slope: &'a [f64],
+    /// How far ahead anything is worth knowing, metres.
+    pub limit: &'a [f64],
     /// How fast footprints grow along a ray at most.
     pub footprint_slope: f64,
 }
@@ -87,7 +90,7 @@ impl Ahead {
         simd: S,
         code: &Code,
         along: &Slopes<1>,
-        errors: Errors<'_>,
+        outlook: Outlook<'_>,
         root: usize,
         length: &mut [f64],
     ) {
@@ -105,11 +108,17 @@ impl Ahead {
                 cascade: 0,
             };
             for instruction in &code.instructions {
-                self.step(simd, instruction, along, errors.footprint_slope, &mut place);
+                self.step(
+                    simd,
+                    instruction,
+                    along,
+                    outlook.footprint_slope,
+                    &mut place,
+                );
                 std::mem::swap(&mut self.registers[instruction.result], &mut self.result);
             }
             let end = start + points;
-            let errors = [&errors.offset[start..end], &errors.slope[start..end]];
+            let errors = [&outlook.offset[start..end], &outlook.slope[start..end]];
             self.registers[root].clear(&value[start..end], errors, length);
         }
     }

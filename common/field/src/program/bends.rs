@@ -20,6 +20,7 @@ use crate::noise;
 use crate::op::Basis;
 use crate::program::bounds::{Bound, Change, NOISE, Pass};
 use crate::program::plan::{Act, Plan, Step};
+use crate::shape::Within;
 use crate::surroundings::Surroundings;
 
 /// Error of a derivative that evaluation computes, as a share of the field's slope bound. Noises
@@ -148,7 +149,20 @@ fn bend(step: &Step, around: &Surroundings, bounds: &[Bound], bends: &[Interval]
         Act::Cascade(cascade) => of_cascade(cascade, around, number(0).slope, size(0)).bend,
         // The derivatives of other noises are rounded to more than tangents allow for.
         Act::AnyNoise(_) | Act::NoiseGradient(_) => Interval::ALL,
-        Act::Curve(_) | Act::Select | Act::Shape(_) | Act::Grid(_) => Interval::ALL,
+        Act::Shape(shape) => match step.args[..] {
+            [_, _] => Interval::ALL,
+            _ => {
+                let (v, parts) = (number(0), bounds[step.args[0]].parts());
+                let within = Within {
+                    parts,
+                    norm: v.range,
+                };
+                let square = Interval::new(0.0, v.slope * v.slope * ROOM);
+                let turn = times(shape.bound(&within).slope, size(0));
+                shape.bend(&within).mul(square).add(either_way(turn))
+            }
+        },
+        Act::Curve(_) | Act::Select | Act::Grid(_) => Interval::ALL,
     }
 }
 

@@ -3,7 +3,7 @@
 use crate::hash::{hash, unit};
 use crate::program::tests::{fig_5_6, noise_zoo, planet, scaled, values, zoo};
 use crate::{
-    BATCH, Errors, Graph, Interval, NodeId, Op, Points, Program, Region, Scratch, SimdLevel,
+    BATCH, Graph, Interval, NodeId, Op, Outlook, Points, Program, Region, Scratch, SimdLevel,
     Surroundings,
 };
 
@@ -194,6 +194,7 @@ struct Asked<'a> {
     points: Points<'a>,
     direction: [&'a [f64]; 3],
     guess: &'a [f64],
+    limit: &'a [f64],
     offset: &'a [f64],
     slope: &'a [f64],
 }
@@ -215,7 +216,7 @@ fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
         let part = |all: &'_ [f64]| all[batch.clone()].to_vec();
         let [x, y, z, footprint, time] = [x, y, z, footprint, time].map(part);
         let [dx, dy, dz] = asked.direction.map(part);
-        let (offset, slope) = (part(asked.offset), part(asked.slope));
+        let [offset, slope, limit] = [asked.offset, asked.slope, asked.limit].map(part);
         let points = Points {
             x: &x,
             y: &y,
@@ -223,14 +224,15 @@ fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
             footprint: &footprint,
             time: &time,
         };
-        let errors = Errors {
+        let outlook = Outlook {
             offset: &offset,
             slope: &slope,
+            limit: &limit,
             footprint_slope: PIXEL_ANGLE,
         };
         let (mut value, mut along) = (vec![0.0; n], vec![0.0; n]);
         let out = [&mut value[..], &mut along, &mut ahead[batch]];
-        program.evaluate_ahead(level, &points, [&dx, &dy, &dz], errors, &mut scratch, out);
+        program.evaluate_ahead(level, &points, [&dx, &dy, &dz], outlook, &mut scratch, out);
     }
     ahead
 }
@@ -258,6 +260,7 @@ impl Pairs {
         let number = |i: usize, k: u32| unit(hash(&[7, u32::try_from(i).unwrap(), k]));
         let each = |of: &dyn Fn(usize) -> f64| (0..n).map(of).collect::<Vec<_>>();
         let guess = each(&|i| distance(i) * libm::exp2(6.0 * number(i, 0) - 3.0));
+        let limit = each(&|i| guess[i] * libm::exp2(4.0 * number(i, 2)));
         let floor = each(&|i| f[i] - libm::exp2(20.0 * number(i, 1) - 16.0));
         let offset = each(&|i| taylor.offset + floor[i]);
         let [dx, dy, dz] = &direction;
@@ -272,6 +275,7 @@ impl Pairs {
             },
             direction: [dx, dy, dz],
             guess: &guess,
+            limit: &limit,
             offset: &offset,
             slope: &vec![taylor.slope; n],
         };
@@ -282,10 +286,10 @@ impl Pairs {
             assert!(same, "{name} at {level}");
         }
         let mut outside = vec![false; n];
-        for step in 1..=8 {
+        for step in 1..=16 {
             let mut columns: [Vec<f64>; 5] = Default::default();
             for i in 0..n {
-                let place = at(i, ahead[i] * f64::from(step) / 8.0, &direction);
+                let place = at(i, ahead[i] * f64::from(step) / 16.0, &direction);
                 outside[i] |= !inside(self.around.region, place);
                 let row = [
                     place[0],
@@ -313,7 +317,7 @@ impl Pairs {
                     "{name}: {} is below {} after {} of {}",
                     there[i],
                     floor[i],
-                    f64::from(step) / 8.0,
+                    f64::from(step) / 16.0,
                     ahead[i]
                 );
             }

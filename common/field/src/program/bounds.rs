@@ -124,7 +124,7 @@ impl Bound {
         }
     }
 
-    fn parts(&self) -> [Interval; 3] {
+    pub(crate) fn parts(&self) -> [Interval; 3] {
         match self {
             Self::Vector { parts, .. } => *parts,
             Self::Scalar { range, .. } => [*range; 3],

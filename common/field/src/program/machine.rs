@@ -195,7 +195,7 @@ impl Machine {
                 #[inline(always)]
                 |a| curve.value(a),
             ),
-            Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
+            Operation::Shape(shape) => shape.values(simd, n, [a, b, c], out),
             Operation::Grid(surface) => each3(
                 n,
                 [a, b, c],

@@ -133,7 +133,7 @@ impl Program {
             return None;
         }
         let code = Code::new(&plan).ok()?;
-        Some(Self { plan, code })
+        Some(Self::of_code(plan, code))
     }
 }
 

@@ -169,7 +169,7 @@ impl<const N: usize> Slopes<N> {
                     a.chain(value, slope)
                 },
             ),
-            Operation::Shape(shape) => each3(n, [a, b, c], out, |a, b, c| shape.value([a, b, c])),
+            Operation::Shape(shape) => shape.values(simd, n, [a, b, c], out),
             Operation::Grid(surface) => each3(
                 n,
                 [a, b, c],

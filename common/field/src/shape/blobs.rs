@@ -1,17 +1,26 @@
 //! Blobby surfaces, thesis eq. (2.9): points whose influences add up.
 
+mod lanes;
+mod piece;
+mod walk;
+
+#[cfg(test)]
+mod tests;
+
 use super::Refusal;
 use super::local::{Local, dot, less};
 use super::sum::{Rules, Summed};
 use super::supports::Supports;
 use super::within::{Extent, Known, Within};
-use crate::interval::Interval;
+use crate::interval::{Interval, smaller};
+pub(crate) use walk::Walk;
 
 /// T − Σ aᵢ h(‖x − xᵢ‖/rᵢ), and beyond all supports the far field of (7.9).
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Blobs {
     rules: Rules,
     points: Vec<Point>,
+    least_radius: f64,
     supports: Supports,
 }
 
@@ -51,13 +60,15 @@ impl Blobs {
             .collect::<Result<Vec<_>, _>>()?;
         let supports = Supports::sorted(&mut points, |point| {
             if rules.kernel.ends() {
-                Extent::around(&[point.centre], point.radius)
+                Extent::of_ball(point.centre, point.radius)
             } else {
                 Extent::ALL
             }
         });
+        let radii = points.iter().map(|point| point.radius);
         Ok(Self {
             rules,
+            least_radius: radii.fold(f64::INFINITY, smaller),
             points,
             supports,
         })
@@ -104,12 +115,7 @@ impl Blobs {
             }
         }
         match nearest {
-            Some((distance, point)) if distance > 0.0 => {
-                let away = less(at.clone(), point.centre);
-                dot(away.clone(), away)
-                    .sqrt()
-                    .minus(N::constant(point.radius))
-            }
+            Some((distance, point)) if distance > 0.0 => point.beyond(at),
             _ => N::constant(0.0),
         }
     }
@@ -117,12 +123,33 @@ impl Blobs {
     pub(crate) fn bound(&self, within: &Within) -> Known {
         self.rules.bound(self, &self.supports, within)
     }
+
+    pub(crate) fn bend(&self, within: &Within) -> Interval {
+        self.rules.bend(self, &self.supports, within)
+    }
+}
+
+impl Point {
+    /// ‖x − xᵢ‖ − rᵢ.
+    #[inline(always)]
+    fn beyond<N: Local>(&self, at: &[N; 3]) -> N {
+        let away = less(at.clone(), self.centre);
+        dot(away.clone(), away)
+            .sqrt()
+            .minus(N::constant(self.radius))
+    }
+
+    /// All d/r.
+    fn rho(&self, within: &Within) -> Interval {
+        let inverse = Interval::point(1.0 / self.radius).widen();
+        let rho = within.distance(self.centre).mul(inverse);
+        Interval::new(if rho.low > 0.0 { rho.low } else { 0.0 }, rho.high)
+    }
 }
 
 impl Summed for Blobs {
     fn size(&self) -> f64 {
-        let least = self.points.iter().map(|point| point.radius);
-        least.fold(f64::INFINITY, |a, b| if b < a { b } else { a })
+        self.least_radius
     }
 
     fn weight(&self) -> f64 {
@@ -132,14 +159,19 @@ impl Summed for Blobs {
     fn term(&self, i: usize, within: &Within) -> (Interval, f64) {
         let point = &self.points[i];
         let inverse = Interval::point(1.0 / point.radius).widen();
-        let rho = within.distance(point.centre).mul(inverse);
-        let rho = Interval::new(if rho.low > 0.0 { rho.low } else { 0.0 }, rho.high);
+        let rho = point.rho(within);
         let weight = Interval::point(point.weight);
         let kernel = self.rules.kernel;
         (
             kernel.range(rho).mul(weight),
             kernel.slope(rho) * point.weight.abs() * inverse.high,
         )
+    }
+
+    fn bend(&self, i: usize, within: &Within) -> Interval {
+        let point = &self.points[i];
+        let scale = Interval::point(point.weight * point.inverse).widen();
+        self.rules.kernel.bend(point.rho(within)).mul(scale)
     }
 
     fn beyond(&self, within: &Within) -> Interval {

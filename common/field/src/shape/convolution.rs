@@ -97,6 +97,10 @@ impl Convolution {
     pub(crate) fn bound(&self, within: &Within) -> Known {
         self.rules.bound(self, &self.supports, within)
     }
+
+    pub(crate) fn bend(&self, within: &Within) -> Interval {
+        self.rules.bend(self, &self.supports, within)
+    }
 }
 
 impl Summed for Convolution {
@@ -135,6 +139,25 @@ impl Summed for Convolution {
             range.mul(Interval::point(term.weight)),
             slope * term.weight.abs() * inverse.high,
         )
+    }
+
+    /// The integral of those of the kernel about every place of the piece.
+    fn bend(&self, i: usize, within: &Within) -> Interval {
+        let term = &self.terms[i];
+        let inverse = Interval::point(1.0 / term.radius).widen();
+        let mut bend = Interval::point(0.0);
+        for ball in &term.balls {
+            let rho = ball.distance(within).mul(inverse);
+            let rho = Interval::new(larger(rho.low, 0.0), rho.high);
+            // A cover's measures may be a little larger than the piece's own, and of curves much larger.
+            let measure = match &term.piece {
+                Piece::Quadratic(_) => Interval::new(0.0, ball.measure),
+                _ => Interval::point(ball.measure).expand(1e-8 * ball.measure),
+            };
+            bend = bend.add(self.rules.kernel.bend(rho).mul(measure));
+        }
+        let scale = Interval::point(term.weight).mul(inverse.square());
+        bend.mul(scale)
     }
 
     fn beyond(&self, _: &Within) -> Interval {

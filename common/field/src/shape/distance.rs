@@ -98,6 +98,10 @@ impl Distances {
     pub(crate) fn bound(&self, within: &Within) -> Known {
         self.rules.bound(self, &self.supports, within)
     }
+
+    pub(crate) fn bend(&self, within: &Within) -> Interval {
+        self.rules.bend(self, &self.supports, within)
+    }
 }
 
 impl Covered {
@@ -125,6 +129,13 @@ impl Covered {
             }
         }
         square(nearest, at)
+    }
+
+    /// All d/r.
+    fn rho(&self, within: &Within) -> Interval {
+        let inverse = Interval::point(1.0 / self.primitive.radius).widen();
+        let rho = self.distance(within).mul(inverse);
+        Interval::new(larger(rho.low, 0.0), rho.high)
     }
 
     fn distance(&self, within: &Within) -> Interval {
@@ -156,14 +167,38 @@ impl Summed for Distances {
     fn term(&self, i: usize, within: &Within) -> (Interval, f64) {
         let term = &self.primitives[i];
         let inverse = Interval::point(1.0 / term.primitive.radius).widen();
-        let rho = term.distance(within).mul(inverse);
-        let rho = Interval::new(larger(rho.low, 0.0), rho.high);
+        let rho = term.rho(within);
         let weight = term.primitive.weight;
         let kernel = self.rules.kernel;
         (
             kernel.range(rho).mul(Interval::point(weight)),
             kernel.slope(rho) * weight.abs() * inverse.high,
         )
+    }
+
+    /// The square of the distance to one convex piece has second derivatives from 0 to 2; of several, and of
+    /// curves and arcs, it bends down without a bound where the nearest point changes.
+    fn bend(&self, i: usize, within: &Within) -> Interval {
+        let term = &self.primitives[i];
+        let Primitive {
+            pieces,
+            radius,
+            weight,
+        } = &term.primitive;
+        let is_point = match &pieces[..] {
+            [Piece::Point(_)] => true,
+            [Piece::Segment(_) | Piece::Polygon(_)] => false,
+            _ => return Interval::ALL,
+        };
+        let scale = Interval::point(weight / (radius * radius)).widen();
+        let rho = term.rho(within);
+        let kernel = self.rules.kernel;
+        let bend = if is_point {
+            kernel.bend(rho)
+        } else {
+            kernel.bend_of_convex(rho)
+        };
+        bend.mul(scale)
     }
 
     fn beyond(&self, within: &Within) -> Interval {

@@ -1,5 +1,7 @@
 //! The blending functions h of thesis eqs. (2.9)–(2.11): how a primitive's influence falls with distance.
 
+mod bends;
+
 use super::local::Local;
 use crate::interval::Interval;
 
@@ -42,12 +44,19 @@ impl Kernel {
     }
 
     /// Whether it is 0 from ρ = 1 on.
+    #[inline(always)]
     pub(crate) fn ends(self) -> bool {
         !matches!(self, Self::Blinn | Self::Cauchy)
     }
 
+    /// Whether a term counts at u: where it does not, or u is not a number, it is 0.
+    #[inline(always)]
+    pub(crate) fn reaches(self, u: f64) -> bool {
+        if self.ends() { u < 1.0 } else { !u.is_nan() }
+    }
+
     /// Its value and its first two derivatives by u.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn jet(self, u: f64) -> [f64; 3] {
         if u >= 1.0 && self.ends() {
             return [0.0; 3];
@@ -103,7 +112,7 @@ impl Kernel {
     }
 
     /// h at a number u.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn of<N: Local>(self, u: N) -> N {
         let jet = self.jet(u.at());
         u.through(jet)

@@ -11,6 +11,7 @@ mod blobs;
 mod convolution;
 mod distance;
 mod kernel;
+mod lanes;
 mod local;
 mod polynomial;
 mod roots;
@@ -23,15 +24,18 @@ mod within;
 #[cfg(test)]
 pub(crate) mod tests;
 
+use fearless_simd::Simd;
+
 use crate::interval::{Interval, larger};
 use crate::op::Op;
 use crate::range::Arithmetic;
 use bend::Bend;
 use bernstein::Bernstein;
 use blend::Blend;
-use blobs::Blobs;
+pub(crate) use blobs::{Blobs, Walk};
 use convolution::Convolution;
 use distance::Distances;
+pub(crate) use lanes::Rows;
 pub(crate) use local::Local;
 use polynomial::Polynomial;
 use superquadric::Superquadric;
@@ -87,6 +91,15 @@ impl Shape {
         }
     }
 
+    /// Its values at the first `n` lanes' places, those of [`Self::value`] to the bit; `n` is a multiple of [`lanes::WIDTH`].
+    #[inline(always)]
+    pub(crate) fn values<S: Simd, R: Rows>(&self, simd: S, n: usize, at: [&R; 3], out: &mut R) {
+        match self {
+            Self::Blobs(shape) => shape.values(simd, n, at, out),
+            _ => lanes::each(n, at, out, |at| self.value(at)),
+        }
+    }
+
     /// What is known over a region. The slope is per unit of the place, of a blend per unit of the larger change.
     pub(crate) fn bound(&self, within: &Within) -> Known {
         match self {
@@ -110,6 +123,19 @@ impl Shape {
 }
 
 impl Shape {
+    /// All second derivatives along unit directions over a region; infinite where they have no bound.
+    pub(crate) fn bend(&self, within: &Within) -> Interval {
+        match self {
+            Self::Polynomial(shape) => shape.bend(within),
+            Self::Blobs(shape) => shape.bend(within),
+            Self::Distances(shape) => shape.bend(within),
+            Self::Convolution(shape) => shape.bend(within),
+            // Powers from 1 on of norms are convex.
+            Self::Superquadric(_) => Interval::new(0.0, f64::INFINITY),
+            Self::Bernstein(_) | Self::Bend(_) | Self::Blend(_) => Interval::ALL,
+        }
+    }
+
     /// What is known over a box of places, or over the values of two numbers.
     pub(crate) fn known(&self, parts: [Interval; 3]) -> Known {
         let norm = Interval::new(0.0, f64::INFINITY);

@@ -17,6 +17,8 @@ pub(crate) struct Polynomial {
     terms: Vec<Term>,
     /// Its derivatives by x, y and z.
     slopes: [Vec<Term>; 3],
+    /// Its second derivatives by xx, yy and zz, and by yz, xz and xy.
+    bends: [[Vec<Term>; 3]; 2],
     /// Highest power of each coordinate.
     powers: [usize; 3],
 }
@@ -47,6 +49,8 @@ impl Polynomial {
             });
         }
         let slopes = [0, 1, 2].map(|axis| derivative(&terms, axis));
+        let bends = [[(0, 0), (1, 1), (2, 2)], [(1, 2), (0, 2), (0, 1)]]
+            .map(|pairs| pairs.map(|(first, second)| derivative(&slopes[first], second)));
         let powers = [0, 1, 2].map(|axis| {
             terms
                 .iter()
@@ -57,6 +61,7 @@ impl Polynomial {
         Ok(Self {
             terms,
             slopes,
+            bends,
             powers,
         })
     }
@@ -94,6 +99,20 @@ impl Polynomial {
         if !within.is_bounded() {
             return self.bound_piece(within);
         }
+        Known::over(&Self::pieces(within), |piece| self.bound_piece(piece))
+    }
+
+    /// All second derivatives along unit directions.
+    pub(crate) fn bend(&self, within: &Within) -> Interval {
+        if !within.is_bounded() {
+            return self.bend_piece(within);
+        }
+        let pieces = Self::pieces(within).into_iter();
+        let bends = pieces.map(|piece| self.bend_piece(&piece));
+        bends.reduce(Interval::hull).unwrap_or(Interval::ALL)
+    }
+
+    fn pieces(within: &Within) -> Vec<Within> {
         let widest = within.parts.iter().fold(0.0, |most: f64, part| {
             if part.width() > most {
                 part.width()
@@ -101,8 +120,21 @@ impl Polynomial {
                 most
             }
         });
-        let pieces = within.pieces(widest / f64::from(PIECES), PIECES);
-        Known::over(&pieces, |piece| self.bound_piece(piece))
+        within.pieces(widest / f64::from(PIECES), PIECES)
+    }
+
+    /// By Gershgorin's circles about the Hessian's diagonal.
+    fn bend_piece(&self, within: &Within) -> Interval {
+        let [diagonal, across] = self
+            .bends
+            .each_ref()
+            .map(|lists| lists.each_ref().map(|terms| range(terms, &within.parts)));
+        let [yz, xz, xy] = across.map(Interval::magnitude);
+        let rows = [(0, xy + xz), (1, xy + yz), (2, xz + yz)];
+        rows.map(|(axis, rest)| diagonal[axis].expand(rest))
+            .into_iter()
+            .reduce(Interval::hull)
+            .unwrap_or(Interval::ALL)
     }
 
     /// By the natural extension of the polynomial, and by that of its gradient about the middle.

@@ -27,6 +27,8 @@ pub(crate) trait Summed {
     fn weight(&self) -> f64;
     /// The values of a term aᵢ gᵢ over a region, and a bound of its slope.
     fn term(&self, i: usize, within: &Within) -> (Interval, f64);
+    /// All second derivatives of a term along unit directions.
+    fn bend(&self, i: usize, within: &Within) -> Interval;
     /// How far the region is outside of all supports: negative within one.
     fn beyond(&self, within: &Within) -> Interval;
 }
@@ -73,6 +75,30 @@ impl Rules {
             known = known.and(self.with_far(sum, within, empty, 0.0, rounding));
         }
         known
+    }
+
+    /// All second derivatives of a sum along unit directions, found over pieces.
+    ///
+    /// Far fields bend down without a bound where the nearest support changes.
+    pub(crate) fn bend(&self, sum: &impl Summed, supports: &Supports, within: &Within) -> Interval {
+        if self.far && sum.beyond(within).high > 0.0 {
+            return Interval::ALL;
+        }
+        let over = |piece: &Within| {
+            let mut total = Interval::point(0.0);
+            supports.over(&piece.parts, |i| total = total.add(sum.bend(i, piece)));
+            total.neg()
+        };
+        let none = Interval::point(0.0);
+        match within.clipped(&supports.all) {
+            None => none,
+            Some(near) if near.is_bounded() => {
+                let pieces = near.pieces(0.75 * sum.size(), PIECES);
+                let bends = pieces.iter().map(over);
+                bends.fold(none, Interval::hull)
+            }
+            Some(near) => over(&near).hull(none),
+        }
     }
 
     fn over(

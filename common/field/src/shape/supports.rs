@@ -11,22 +11,22 @@ const GROUP: usize = 8;
 /// The supports of a sum's terms, in the order in which they are summed.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Supports {
-    terms: Vec<Extent>,
-    groups: Vec<Extent>,
+    groups: Vec<Group>,
     /// The box around all of them.
     pub(crate) all: Extent,
+}
+
+/// The supports of some neighbours in the list, axis by axis, so that all are looked at together.
+#[derive(Clone, PartialEq, Debug)]
+struct Group {
+    hull: Extent,
+    min: [[f64; GROUP]; 3],
+    max: [[f64; GROUP]; 3],
 }
 
 impl Supports {
     /// Sorts the terms so that neighbours in the list are neighbours in space, and boxes them.
     pub(crate) fn sorted<T>(terms: &mut [T], of: impl Fn(&T) -> Extent) -> Self {
-        let hull = |extents: &[Extent]| {
-            extents
-                .iter()
-                .copied()
-                .reduce(Extent::hull)
-                .unwrap_or(Extent::around(&[], 0.0))
-        };
         let centre = |extent: &Extent| {
             [0, 1, 2].map(|k| {
                 let middle = 0.5 * (extent.min[k] + extent.max[k]);
@@ -38,42 +38,65 @@ impl Supports {
         terms.sort_by_key(|term| morton(centre(&of(term)), &frame));
         let extents: Vec<Extent> = terms.iter().map(of).collect();
         Self {
-            groups: extents.chunks(GROUP).map(hull).collect(),
+            groups: extents.chunks(GROUP).map(Group::new).collect(),
             all: hull(&extents),
-            terms: extents,
         }
     }
 
     /// Calls `visit` with every term whose support holds the place, in order.
     #[inline]
-    pub(crate) fn at(&self, place: [f64; 3], mut visit: impl FnMut(usize)) {
-        for (group, extent) in self.groups.iter().enumerate() {
-            if extent.holds(place) {
-                let first = group * GROUP;
-                let terms = self.terms[first..].iter().take(GROUP);
-                for (i, term) in terms.enumerate() {
-                    if term.holds(place) {
-                        visit(first + i);
-                    }
-                }
-            }
-        }
+    pub(crate) fn at(&self, place: [f64; 3], visit: impl FnMut(usize)) {
+        self.over(&place.map(Interval::point), visit);
     }
 
     /// Calls `visit` with every term whose support meets the box, in order.
+    #[inline(always)]
     pub(crate) fn over(&self, parts: &[Interval; 3], mut visit: impl FnMut(usize)) {
-        for (group, extent) in self.groups.iter().enumerate() {
-            if extent.meets(parts) {
-                let first = group * GROUP;
-                let terms = self.terms[first..].iter().take(GROUP);
-                for (i, term) in terms.enumerate() {
-                    if term.meets(parts) {
-                        visit(first + i);
-                    }
+        for (group, terms) in self.groups.iter().enumerate() {
+            if terms.hull.meets(parts) {
+                let mut meeting = terms.meeting(parts);
+                while meeting != 0 {
+                    visit(group * GROUP + meeting.trailing_zeros() as usize);
+                    meeting &= meeting - 1;
                 }
             }
         }
     }
+}
+
+impl Group {
+    fn new(extents: &[Extent]) -> Self {
+        // Where there is no term nothing is met.
+        let empty = Extent::around(&[], 0.0);
+        let of = |i: usize| extents.get(i).unwrap_or(&empty);
+        Self {
+            hull: hull(extents),
+            min: [0, 1, 2].map(|k| std::array::from_fn(|i| of(i).min[k])),
+            max: [0, 1, 2].map(|k| std::array::from_fn(|i| of(i).max[k])),
+        }
+    }
+
+    /// Which terms meet the box, as bits.
+    #[inline(always)]
+    fn meeting(&self, [x, y, z]: &[Interval; 3]) -> u32 {
+        let ([ax, ay, az], [bx, by, bz]) = (&self.min, &self.max);
+        let mut meeting = 0;
+        for i in 0..GROUP {
+            let meets = (x.low <= bx[i])
+                & (x.high >= ax[i])
+                & (y.low <= by[i])
+                & (y.high >= ay[i])
+                & (z.low <= bz[i])
+                & (z.high >= az[i]);
+            meeting |= u32::from(meets) << i;
+        }
+        meeting
+    }
+}
+
+fn hull(extents: &[Extent]) -> Extent {
+    let all = extents.iter().copied().reduce(Extent::hull);
+    all.unwrap_or(Extent::around(&[], 0.0))
 }
 
 /// A place's number along a curve that visits neighbours together (Morton's order, ten bits an axis).

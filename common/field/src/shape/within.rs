@@ -53,22 +53,19 @@ impl Extent {
         extent
     }
 
+    /// A box that holds every place whose computed distance from the centre is below the radius.
+    pub(crate) fn of_ball(centre: [f64; 3], radius: f64) -> Self {
+        let size = centre
+            .iter()
+            .fold(radius, |most, part| larger(most, part.abs()));
+        Self::around(&[centre], radius + 16.0 * f64::EPSILON * size)
+    }
+
     pub(crate) fn hull(self, other: Self) -> Self {
         Self {
             min: [0, 1, 2].map(|k| smaller(self.min[k], other.min[k])),
             max: [0, 1, 2].map(|k| larger(self.max[k], other.max[k])),
         }
-    }
-
-    /// Whether a place lies in it.
-    #[inline(always)]
-    pub(crate) fn holds(&self, p: [f64; 3]) -> bool {
-        p[0] >= self.min[0]
-            && p[0] <= self.max[0]
-            && p[1] >= self.min[1]
-            && p[1] <= self.max[1]
-            && p[2] >= self.min[2]
-            && p[2] <= self.max[2]
     }
 
     /// Whether it and the region have places in common.

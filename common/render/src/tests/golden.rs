@@ -7,7 +7,7 @@ use crate::{EvalSettings, REVISION};
 const BLESSED: u32 = 3;
 
 /// BLAKE3 of the planes of every small scene, f32 little-endian.
-const DIGESTS: [(&str, &str); 7] = [
+const DIGESTS: [(&str, &str); 8] = [
     (
         "sphere",
         "a97d2f9ca84f7d315a10d9d384c5d87765f22c8d5c8c7c00e0ae45eee261c4fc",
@@ -35,6 +35,10 @@ const DIGESTS: [(&str, &str); 7] = [
     (
         "bodies",
         "e726c90017453619a1a959bf2a1a45977acad7c4709b545789d275014f6dfe10",
+    ),
+    (
+        "blobs",
+        "1b280868af1b95173b3a047e51e21510a1ddadaa018190ae92db815a86410fa0",
     ),
 ];
 

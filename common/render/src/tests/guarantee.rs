@@ -334,7 +334,7 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
             })
             .collect();
         let (hits, counts) = trace(&surface, Goal::Distance, &rays);
-        assert!(counts.cone_steps > 0, "{name}");
+        assert!(counts.cone_steps > 0 || surface.walks(), "{name}");
         for (ray, hit) in rays.iter().zip(&hits) {
             let (alone, _) = trace(&surface, Goal::Distance, std::slice::from_ref(ray));
             assert_eq!(alone[0], *hit, "{name}: {ray:?}");

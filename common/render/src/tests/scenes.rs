@@ -256,6 +256,33 @@ pub(super) fn cube() -> Description {
     scene
 }
 
+/// Soft balls of two signs, turned and stretched, in perspective with shadows.
+pub(super) fn blobs() -> Description {
+    let mut fields = Fields::new();
+    let p = fields.position();
+    let factor = fields.number(1.25);
+    let scaled = fields.op(Op::Scale, &[p, factor], &[]);
+    let mut params = vec![3.0, 0.4, 1.0];
+    for (place, radius, weight) in [
+        ([0.0, 0.0, 0.0], 1.0, 1.0),
+        ([0.9, 0.2, 0.3], 0.7, 1.0),
+        ([-0.6, -0.5, 0.5], 0.8, 0.9),
+        ([0.1, -0.8, 0.2], 0.5, -0.7),
+        ([-0.3, 0.4, -0.9], 0.9, 1.2),
+    ] {
+        params.extend(place);
+        params.extend([radius, weight]);
+    }
+    let field = fields.op(Op::Blobs, &[scaled], &params);
+    let bound = Bound::Shell {
+        inner: 0.0,
+        outer: 1.8,
+    };
+    let mut scene = standing(fields.0, field, bound, [0.0, -4.0, 0.0]);
+    scene.surface.seed = Seed::Sphere { radius: 1.0 };
+    scene
+}
+
 /// A surface within a distance of the origin, seen by parallel rays from aside.
 pub(super) fn orthographic(graph: Graph, field: NodeId, outer: f64) -> Description {
     let bound = Bound::Shell { inner: 0.0, outer };
@@ -273,7 +300,7 @@ pub(super) fn orthographic(graph: Graph, field: NodeId, outer: f64) -> Descripti
 }
 
 /// Every small scene, by name.
-pub(super) fn all() -> [(&'static str, Description); 7] {
+pub(super) fn all() -> [(&'static str, Description); 8] {
     [
         ("sphere", sphere()),
         ("plane", plane()),
@@ -282,6 +309,7 @@ pub(super) fn all() -> [(&'static str, Description); 7] {
         ("planet", planet()),
         ("cube", cube()),
         ("bodies", bodies()),
+        ("blobs", blobs()),
     ]
 }
 

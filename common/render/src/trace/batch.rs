@@ -1,6 +1,6 @@
 //! Places along many rays, and the field's values there: structure of arrays.
 
-use field::{BATCH, Errors, Points, Scratch};
+use field::{BATCH, Outlook, Points, Scratch};
 use glam::DVec3;
 
 use super::surface::Surface;
@@ -164,28 +164,29 @@ impl Batch {
     }
 
     /// Evaluates the field at the places, its derivative along the paths, and how far ahead it is positive,
-    /// from a first guess in `ahead`.
+    /// from a first guess in `ahead`. The field's errors and how far it is wanted are in the other rows.
     pub(crate) fn evaluate_ahead(
         &mut self,
         surface: &Surface,
         n: usize,
         paths: &Paths,
-        [offset, slope]: [&Lanes; 2],
+        [offset, slope, limit]: [&Lanes; 3],
         ahead: &mut Lanes,
         scratch: &mut Scratch,
     ) {
         let (mut value, mut derivative) = ([0.0; BATCH], [0.0; BATCH]);
         let [x, y, z] = &paths.direction;
-        let errors = Errors {
+        let outlook = Outlook {
             offset: &offset[..n],
             slope: &slope[..n],
+            limit: &limit[..n],
             footprint_slope: surface.footprint.angle,
         };
         surface.program.evaluate_ahead(
             surface.level,
             &self.points(n, paths),
             [&x[..n], &y[..n], &z[..n]],
-            errors,
+            outlook,
             scratch,
             [&mut value[..n], &mut derivative[..n], &mut ahead[..n]],
         );

@@ -21,8 +21,8 @@ pub enum Means {
     Values,
     /// Also the derivative along the ray, and the bound of the field's fall below its tangent. Values where no such bound is known.
     Tangents,
-    /// Also the range of that derivative on the stretch ahead, from every noise at the place. Values where a field has
-    /// operations that cannot be looked ahead of.
+    /// Also the range of that derivative on the stretch ahead, from every noise at the place; where the field is blobs
+    /// alone, the whole way to the first root. Values where a field has operations that cannot be looked ahead of.
     Stretches,
     /// Ranges over ever shorter stretches, thesis fig. 5.8, in one of three arithmetics.
     Ranges(Arithmetic),
@@ -88,7 +88,19 @@ impl Means {
             Self::Ranges(_) => 50.0,
         }
     }
+
+    /// What a step along a surface's ray costs.
+    fn cost_for(self, surface: &Surface) -> f64 {
+        if self == Self::Stretches && surface.program.walks() {
+            WALK
+        } else {
+            self.cost()
+        }
+    }
 }
+
+/// What a step costs that walks to the ray's first root or its end, beside the evaluation of a value.
+const WALK: f64 = 4.0;
 
 /// Where the cheapest of the others costs a ray so many values, ranges are tried too,
 const DEAR: f64 = 200.0;
@@ -146,7 +158,7 @@ fn cost(surface: &Surface, tracer: &mut Tracer, rays: &[Ray], means: Means, step
         return f64::INFINITY;
     }
     let steps = counts.steps as f64;
-    ((counts.evaluations as f64 - steps) + steps * means.cost()) / rays.len() as f64
+    ((counts.evaluations as f64 - steps) + steps * means.cost_for(&surface)) / rays.len() as f64
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.

@@ -191,8 +191,8 @@ impl Search {
         }
         if surface.means == Means::Stretches {
             rows.guess(n);
-            let errors = [&rows.error, &rows.slope_error];
-            batch.evaluate_ahead(surface, n, paths, errors, &mut rows.seen, scratch);
+            let outlook = [&rows.error, &rows.slope_error, &rows.limit];
+            batch.evaluate_ahead(surface, n, paths, outlook, &mut rows.seen, scratch);
         } else if surface.means == Means::Tangents {
             batch.evaluate_along(surface, n, paths, scratch);
         } else {
@@ -220,7 +220,8 @@ impl Search {
             }
         }
         let known = surface.clearances.known;
-        let is_foreseen = Technique::Foresight.is_used(surface.without);
+        // Walks need no foresight: they reach the root itself.
+        let is_foreseen = Technique::Foresight.is_used(surface.without) && !surface.walks();
         surface.level.vectorize(
             #[inline(always)]
             || rows.advance(n, known, paths, batch, is_foreseen),

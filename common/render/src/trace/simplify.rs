@@ -49,7 +49,7 @@ pub(crate) fn for_rays(surface: &Surface, rays: &[Ray]) -> Option<Surface> {
 
 /// Whether a program can be searched by the same means.
 fn fits(surface: &Surface, program: &Program) -> bool {
-    surface.program.looks_ahead() == program.looks_ahead()
+    program.looks_ahead() || !surface.program.looks_ahead()
 }
 
 /// Cells that hold every place of the rays where the surface can be; `None` where rays are too far apart, or none meets the bound.

@@ -146,6 +146,11 @@ impl Surface {
         Ok(surface)
     }
 
+    /// Whether single rays walk as far as they are outside in one step.
+    pub(crate) fn walks(&self) -> bool {
+        self.means == Means::Stretches && self.program.walks()
+    }
+
     /// The camera ray of a sight.
     pub(crate) fn ray(&self, sight: &Sight) -> Ray {
         Ray {

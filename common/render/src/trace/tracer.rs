@@ -179,7 +179,8 @@ impl Tracer {
                 end,
             })
         }));
-        if Technique::Bundles.is_used(surface.without) {
+        // Rays that walk to their ends by themselves gain nothing by going together.
+        if Technique::Bundles.is_used(surface.without) && !surface.walks() {
             bundles.approach(surface, rays, spans, scratch, counts);
         }
         let results = Results {

@@ -3,6 +3,7 @@
 use crate::lanes::Lanes;
 use crate::number::Dual;
 use crate::points::BATCH;
+use crate::shape::Rows;
 
 /// Duals, one per lane, as structure of arrays.
 #[derive(Debug)]
@@ -51,5 +52,19 @@ impl<const N: usize> Duals<N> {
         for lanes in &mut self.gradient {
             lanes.fill(0.0);
         }
+    }
+}
+
+impl<const N: usize> Rows for Duals<N> {
+    type Number = Dual<N>;
+
+    #[inline(always)]
+    fn at(&self, lane: usize) -> Dual<N> {
+        Self::at(self, lane)
+    }
+
+    #[inline(always)]
+    fn set(&mut self, lane: usize, number: Dual<N>) {
+        Self::set(self, lane, number);
     }
 }

@@ -61,6 +61,8 @@ pub(super) struct Rows {
     /// What values and derivatives may be wrong by.
     pub(super) error: Lanes,
     pub(super) slope_error: Lanes,
+    /// How far ahead it is worth looking.
+    pub(super) limit: Lanes,
     /// How far ahead the field is proven to be positive by its own ranges, and the guess before that.
     pub(super) seen: Lanes,
     /// How far ahead and back of the point no root can be.
@@ -93,6 +95,7 @@ impl Default for Rows {
             growth: [0.0; BATCH],
             error: [0.0; BATCH],
             slope_error: [0.0; BATCH],
+            limit: [0.0; BATCH],
             seen: [0.0; BATCH],
             ahead: [0.0; BATCH],
             behind: [0.0; BATCH],
@@ -110,11 +113,14 @@ impl Rows {
         }
     }
 
-    /// How far ahead to look: a little farther than the last time, but no nearer than the next points.
+    /// How far ahead to look: a little farther than the last time, but no nearer than the next points; and past
+    /// the ray's end there is nothing to be seen.
     pub(super) fn guess(&mut self, n: usize) {
         for i in 0..n {
-            let at = self.at[i];
-            let gap = self.steps.at(i).after(at) - at;
+            let (at, end) = (self.at[i], self.end[i]);
+            let steps = self.steps.at(i);
+            let gap = steps.after(at) - at;
+            self.limit[i] = steps.after(end) - at;
             let least = if self.count[i] > 0.0 {
                 2.0 * gap
             } else {
@@ -251,8 +257,9 @@ impl Rows {
                 self.reach[i]
             }
         };
-        let ahead = most(ahead, self.seen[i]);
-        (cut(ahead, tangent_ahead), cut(behind, tangent_behind))
+        // What has been seen ahead needs no table, and holds as far as it goes.
+        let ahead = most(cut(ahead, tangent_ahead), self.seen[i]);
+        (ahead, cut(behind, tangent_behind))
     }
 }
 
