@@ -60,14 +60,17 @@ fn cells(surface: &Surface, rays: &[Ray]) -> Option<Vec<Cell>> {
     let up = middle.cross(across);
     let mut origin = [Span::NONE; 3];
     let (mut u, mut v, mut s) = (Span::NONE, Span::NONE, Span::NONE);
+    let mut eye = Span::NONE;
     let mut forward_least = 1.0;
     for ray in rays {
         let Some((clear, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
             continue;
         };
-        // Polishing looks at the point before the first.
-        let gap = surface.footprint.at(clear);
-        let (clear, end) = (clear - gap, end + surface.footprint.at(end));
+        // Searches end at the first point of the grid beyond, and begin at one that may be before.
+        let from_eye = ray.from_eye.length();
+        let gap = |t: f64| surface.footprint.at(from_eye + t);
+        let (clear, end) = (clear - gap(clear), end + gap(end));
+        eye.add(from_eye);
         let forward = ray.direction.dot(middle);
         if forward < 0.5 {
             return None;
@@ -104,11 +107,15 @@ fn cells(surface: &Surface, rays: &[Ray]) -> Option<Vec<Cell>> {
         };
         let (low, high) = (near - room, far + room);
         let mut cell = Cell::of_rays(origin, edges, Interval::new(low, high));
-        // Along a ray it is farther than along the middle.
-        let width = |t: f64| surface.footprint.at(if t > 0.0 { t } else { 0.0 });
+        // Along a ray it is farther than along the middle; from the eye, no nearer than the difference of both ways.
+        let (t_low, t_high) = (low, high / forward_least);
+        let nearest = [t_low - eye.high, eye.low - t_high];
+        let nearest = nearest
+            .into_iter()
+            .fold(0.0, |most, d| if d > most { d } else { most });
         cell.footprint = Interval::new(
-            width(low) * (1.0 - ROOM),
-            width(high / forward_least) * (1.0 + ROOM),
+            surface.footprint.at(nearest) * (1.0 - ROOM),
+            surface.footprint.at(eye.high + t_high) * (1.0 + ROOM),
         );
         cells.push(cell);
         if near <= s.low {

@@ -113,7 +113,7 @@ impl Tracer {
         counts: &mut Counts,
         hits: &mut Vec<Hit>,
     ) -> Result<(), Cancelled> {
-        let has_choices = goal == Goal::Distance && simplify::has_choices(surface);
+        let has_choices = simplify::has_choices(surface);
         let together = if has_choices {
             simplify::TOGETHER
         } else {
