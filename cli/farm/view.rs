@@ -39,7 +39,7 @@ pub(crate) struct Job {
     pub(crate) blocks_again: u64,
     /// Pixels in them.
     pub(crate) pixels_again: u64,
-    /// Tiles of each frame.
+    /// Tiles of each frame; 0 where they are cut by time.
     pub(crate) tiles_per_image: u32,
     /// Their size, such as `64x64`.
     pub(crate) tile: Option<String>,
@@ -368,13 +368,15 @@ impl Report for Job {
         )?;
         writeln!(
             out,
-            "  pixels  {} % of {} ({}x{} a frame, {} tiles of {})",
+            "  pixels  {} % of {} ({}x{} a frame, {})",
             self.percent(),
             self.pixels,
             self.width,
             self.height,
-            self.tiles_per_image,
-            self.tile.as_deref().unwrap_or("any size")
+            match &self.tile {
+                Some(tile) => format!("{} tiles of {tile}", self.tiles_per_image),
+                None => "tiles cut by time".to_owned(),
+            }
         )?;
         writeln!(
             out,

@@ -7,7 +7,8 @@ use model::{
     SubmissionId, Timestamp, WorkerId,
 };
 use sched::{
-    BlockRef, Config, Effect, Event, LinkId, RevokeReason, Sched, Submission, TileShape, Verdict,
+    BlockRef, Config, Effect, Event, LinkId, Needs, Offer, RevokeReason, Sched, Submission,
+    TileShape, Verdict,
 };
 use session::{BlockVerdict, Retry, Welcome};
 
@@ -98,6 +99,10 @@ impl Coordinator {
             frames: format!("0..{images}").parse().expect("a range"),
             window: window.rect(),
             tiles,
+            priority: 0,
+            share: 1,
+            needs: Needs::default(),
+            after: Vec::new(),
         };
         coordinator.tell(Timestamp(0), Event::Submit(submission));
         coordinator
@@ -119,8 +124,13 @@ impl Coordinator {
             Up::Hello(held) => Event::WorkerJoined {
                 worker,
                 link: LinkId(link),
-                revision: REVISION,
-                threads: 1,
+                offer: Offer {
+                    revision: REVISION,
+                    threads: 1,
+                    memory_bytes: 0,
+                    labels: BTreeSet::new(),
+                    time_left: None,
+                },
                 held,
             },
             Up::Credit(credit) => Event::Credit { worker, credit },
@@ -149,6 +159,7 @@ impl Coordinator {
                     worker,
                     block,
                     elapsed,
+                    pixels: Digest([1; 32]),
                 },
             ),
             Verdict::Refuse(_) => self.refuse(worker, block, BlockVerdict::AttemptDead),
@@ -181,6 +192,7 @@ impl Coordinator {
                         worker,
                         block,
                         elapsed,
+                        pixels: Digest([1; 32]),
                     },
                 );
             }
@@ -204,8 +216,15 @@ impl Coordinator {
         if self.told.is_multiple_of(CHECK_EVERY) {
             self.sched.check_invariants();
         }
+        let mut failed = Vec::new();
         for effect in effects {
-            self.perform(effect);
+            match effect {
+                Effect::GiveUp { image, reason } => failed.push((image, reason)),
+                effect => self.perform(effect),
+            }
+        }
+        for (image, reason) in failed {
+            self.tell(now, Event::ImageFailed { image, reason });
         }
     }
 
@@ -259,6 +278,10 @@ impl Coordinator {
             Effect::DropScratch { .. }
             | Effect::DropJob { .. }
             | Effect::ForgetJob { .. }
+            | Effect::GiveUp { .. }
+            | Effect::Incident { .. }
+            | Effect::Commanded { .. }
+            | Effect::CommandRefused { .. }
             | Effect::SubmitRefused { .. } => panic!("nobody asked for {effect:?}"),
         };
         self.wishes.push(Wish::Send(worker, down));

@@ -101,6 +101,7 @@ impl Farm {
             0 => TileShape::Rule {
                 min_tile_pixels: None,
             },
+            1 => TileShape::Time { aim: None },
             _ => TileShape::Size { width, height },
         };
         let mut farm = Self {

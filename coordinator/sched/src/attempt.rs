@@ -4,17 +4,28 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use model::rect::GRID_SQUARE;
-use model::{ImageRef, Rect, Span, Timestamp, WorkerId};
+use model::{ImageRef, Rect, Span, Timestamp};
+
+use crate::roster::Place;
+use crate::timers::Alarm;
 
 /// A live attempt; it is removed when it ends.
 #[derive(Clone, Debug)]
 pub(crate) struct Attempt {
-    pub(crate) worker: WorkerId,
+    pub(crate) worker: Place,
     pub(crate) image: ImageRef,
-    /// Index of the tile in its image.
+    /// Number of the tile in its image.
     pub(crate) tile: u32,
     pub(crate) rect: Rect,
     pub(crate) leased: Timestamp,
+    /// What it was expected to cost; 0 where nothing was measured.
+    pub(crate) cost: u64,
+    /// When it is expected to be done.
+    pub(crate) finish: Timestamp,
+    /// Where it stands among the attempts of its job that could be helped.
+    pub(crate) enlisted: Option<Timestamp>,
+    /// When it was first known to run.
+    pub(crate) started: Option<Timestamp>,
     pub(crate) phase: Phase,
     /// Blocks that its worker said it has rendered.
     pub(crate) rendered: u32,
@@ -22,12 +33,14 @@ pub(crate) struct Attempt {
     wanted: u32,
     /// Blocks that arrived under it and are durable.
     pub(crate) delivered: u32,
-    /// One bit per block of the tile, row by row: arrived under this attempt.
-    arrived: Vec<u64>,
+    /// One bit per block of the tile, row by row: arrived under this attempt. The first 64 of them…
+    arrived: u64,
+    /// …and those after them.
+    arrived_more: Vec<u64>,
     /// How long it may take over the next block.
     pub(crate) limit: Span,
-    /// When it counts as stuck; set while it is [`Phase::Running`].
-    pub(crate) stuck: Option<Timestamp>,
+    /// When it counts as stuck; due while it is [`Phase::Running`].
+    pub(crate) stuck: Alarm,
 }
 
 /// What its worker is known to do with an attempt.
@@ -43,12 +56,14 @@ pub(crate) enum Phase {
 
 /// What an attempt starts with.
 pub(crate) struct Start {
-    pub(crate) worker: WorkerId,
+    pub(crate) worker: Place,
     pub(crate) image: ImageRef,
     pub(crate) tile: u32,
     pub(crate) rect: Rect,
     pub(crate) leased: Timestamp,
     pub(crate) wanted: u32,
+    pub(crate) cost: u64,
+    pub(crate) finish: Timestamp,
     pub(crate) limit: Span,
 }
 
@@ -61,13 +76,18 @@ impl Attempt {
             tile: start.tile,
             rect: start.rect,
             leased: start.leased,
+            cost: start.cost,
+            finish: start.finish,
+            enlisted: None,
+            started: None,
             phase: Phase::Ahead,
             rendered: 0,
             wanted: start.wanted,
             delivered: 0,
-            arrived: vec![0; (columns * rows).div_ceil(64)],
+            arrived: 0,
+            arrived_more: vec![0; (columns * rows).div_ceil(64) - 1],
             limit: start.limit,
-            stuck: None,
+            stuck: Alarm::default(),
         }
     }
 
@@ -94,10 +114,24 @@ impl Attempt {
         let row = (block.y0 / GRID_SQUARE - self.rect.y0 / GRID_SQUARE) as usize;
         let index = row * squares(self.rect).0 + column;
         let bit = 1 << (index % 64);
-        let first = self.arrived[index / 64] & bit == 0;
-        self.arrived[index / 64] |= bit;
+        let word = match index / 64 {
+            0 => &mut self.arrived,
+            more => &mut self.arrived_more[more - 1],
+        };
+        let first = *word & bit == 0;
+        *word |= bit;
         self.delivered += u32::from(first);
         first
+    }
+
+    /// Blocks that it was leased for.
+    pub(crate) fn wanted(&self) -> u32 {
+        self.wanted
+    }
+
+    /// Blocks that are rendered, as far as is known.
+    pub(crate) fn done(&self) -> u32 {
+        self.rendered.max(self.delivered)
     }
 
     /// Whether its worker has nothing left to send.

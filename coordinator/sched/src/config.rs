@@ -1,5 +1,8 @@
 //! Every limit of the scheduler, in one value.
 
+use alloc::collections::BTreeSet;
+use alloc::string::String;
+
 use model::{Epoch, Revision, Span};
 
 /// How a scheduler decides; fixed for its life.
@@ -24,14 +27,40 @@ pub struct Config {
     /// A tile whose worker was lost while rendering it so many times, with no
     /// block stored in between, fails its image: it may be what kills them.
     pub tile_losses_max: u32,
-    /// Fewest pixels of a tile where the job leaves the shape to the rule of thesis C.3.2.
+    /// Fewest pixels of a tile where the job leaves the shape to the rule of thesis C.3.2; and
+    /// most pixels of one that is to take some time, while it is not known how long pixels take.
     pub min_tile_pixels: u64,
+    /// How long one thread should take over a tile where the job asks for tiles by time and says no more.
+    pub tile_time: Span,
+    /// A tile by time takes no more than this fraction, one of so many parts, of the time that the
+    /// farm still needs for what waits, so that workers finish together; 0 is no such limit.
+    pub tail_parts: u64,
+    /// A tile is leased a second time, or called back for another worker, only where
+    /// that is expected to gain so much.
+    pub tail_gain: TailGain,
+    /// A worker that failed so many tiles of a job at which others then succeeded is set aside for that job…
+    pub faults_max: u32,
+    /// …and for the farm where it is set aside for so many jobs.
+    pub jobs_aside_max: u32,
+    /// …for so long.
+    pub aside: Span,
+    /// A worker whose time is limited gets a tile of a job of which nothing is measured only where it has so much left.
+    pub unmeasured_needs: Span,
     /// Most tiles of one image, whoever chooses their shape.
     pub max_array_size: u64,
     /// Images of one job that are rendered or encoded at a time.
     pub images_in_flight_max: u32,
     /// What may be asked for.
     pub limits: Limits,
+}
+
+/// What makes it worth touching tiles that are leased already.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct TailGain {
+    /// For calling back a lease that was not started; absent: never.
+    pub call_back: Option<Span>,
+    /// For leasing a tile that runs a second time; absent: never.
+    pub second: Option<Span>,
 }
 
 /// Sizes beyond which a submission, a worker or a text is refused or cut off.
@@ -57,6 +86,14 @@ pub struct Limits {
     pub workers_max: u32,
     /// Tiles that one worker may hold, whatever credit it asks for.
     pub credit_max: u32,
+    /// Largest share of the farm that a job may have.
+    pub share_max: u32,
+    /// Jobs that one job may wait for.
+    pub after_max: u32,
+    /// Labels that a job may ask for or a worker may have.
+    pub labels_max: u32,
+    /// Bytes of a label.
+    pub label_bytes_max: usize,
 }
 
 impl Config {
@@ -72,10 +109,30 @@ impl Config {
             tile_failures_max: 3,
             tile_losses_max: 10,
             min_tile_pixels: 2_500,
+            tile_time: Span::from_secs(1),
+            tail_parts: 4,
+            tail_gain: TailGain {
+                call_back: Some(Span::from_millis(500)),
+                second: Some(Span::from_millis(500)),
+            },
+            faults_max: 2,
+            jobs_aside_max: 2,
+            aside: Span::from_secs(300),
+            unmeasured_needs: Span::from_secs(30),
             max_array_size: 75_000,
             images_in_flight_max: 8,
             limits: Limits::default(),
         }
+    }
+}
+
+impl Limits {
+    /// Whether there may be such labels.
+    pub(crate) fn allow_labels(&self, labels: &BTreeSet<String>) -> bool {
+        labels.len() <= self.labels_max as usize
+            && labels
+                .iter()
+                .all(|label| label.len() <= self.label_bytes_max)
     }
 }
 
@@ -92,6 +149,10 @@ impl Default for Limits {
             failures_kept_max: 1_000,
             workers_max: 10_000,
             credit_max: 1_024,
+            share_max: 1_000,
+            after_max: 16,
+            labels_max: 16,
+            label_bytes_max: 64,
         }
     }
 }

@@ -1,10 +1,11 @@
 //! What the shell must now do.
 
+use alloc::string::String;
 use alloc::vec::Vec;
 
 use model::{AttemptId, ImageRef, JobId, Lease, Rect, SubmissionId, WorkerId};
 
-use crate::{BlockRef, BlockRefusal, SubmitRefusal, WorkerRefusal};
+use crate::{BlockRef, BlockRefusal, CommandRefusal, SubmitRefusal, WorkerRefusal};
 
 /// Something to do. Effects are performed in order; each may be repeated without harm.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -22,6 +23,18 @@ pub enum Effect {
         submission: SubmissionId,
         /// Why.
         refusal: SubmitRefusal,
+    },
+    /// What a user wanted of a job is done.
+    Commanded {
+        /// The job.
+        job: JobId,
+    },
+    /// What a user wanted of a job cannot be done, and changed nothing.
+    CommandRefused {
+        /// The job.
+        job: JobId,
+        /// Why.
+        refusal: CommandRefusal,
     },
     /// Tell a worker that it is taken.
     Welcome {
@@ -78,7 +91,26 @@ pub enum Effect {
         /// The image.
         image: ImageRef,
     },
-    /// Remove an image's scratch file and stop encoding it: nobody wants it.
+    /// An image cannot be rendered: commit and feed [`crate::Event::ImageFailed`]. No more of it is leased.
+    GiveUp {
+        /// The image.
+        image: ImageRef,
+        /// Why, a sentence for the user.
+        reason: String,
+    },
+    /// Two renderings of one block differ. A renderer, a machine or a memory is at fault: an operator must look.
+    Incident {
+        /// The block whose pixels differ from those that were stored before.
+        block: BlockRef,
+        /// The worker that rendered it.
+        worker: WorkerId,
+        /// The worker of the other attempt, where that is still live.
+        other: Option<WorkerId>,
+    },
+    /// Remove an image's scratch file and stop encoding it: nobody wants what is there.
+    ///
+    /// The image may be begun anew later. Of what was accepted for it before this, nothing is
+    /// reported as stored or encoded any more.
     DropScratch {
         /// The image.
         image: ImageRef,
@@ -88,14 +120,15 @@ pub enum Effect {
         /// The job.
         job: JobId,
     },
-    /// A job is over; its scene description is needed no more.
+    /// A job is over. Unless it was cancelled its scene description may be needed again: until
+    /// [`Effect::ForgetJob`] its images can be retried.
     JobDone {
         /// The job.
         job: JobId,
         /// How it ended.
         outcome: JobOutcome,
     },
-    /// A job that is over is no longer in the queries: free what else is kept of it in memory.
+    /// A job that is over is no longer in the queries: free whatever is kept of it but its finished frames.
     ForgetJob {
         /// The job.
         job: JobId,
@@ -131,6 +164,12 @@ pub enum RevokeReason {
     TileDone,
     /// The job was cancelled.
     Cancelled,
+    /// The job pauses, and the tile was not started.
+    Paused,
+    /// The tile was not started, and goes to a worker that has nothing to do.
+    CalledBack,
+    /// Its pixels differ from those of another attempt.
+    Differs,
     /// The image failed.
     ImageFailed,
     /// No block for longer than the progress limit.

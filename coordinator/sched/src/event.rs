@@ -8,11 +8,14 @@ use model::{
     WorkerId,
 };
 
+use crate::{Command, Needs, Offer};
+
 /// Something that happened.
 ///
-/// Durable events (those above [`Event::WorkerJoined`]) are what a journal
-/// holds: the shell commits them before it performs their effects. The others
-/// are volatile: losing them loses no acknowledged block.
+/// Those that [`Event::is_durable`] are what a journal holds: the shell commits them before it
+/// performs their effects. The others are volatile. The durable ones alone, told again in
+/// order to a scheduler of a later epoch, bring back every job, image and acknowledged
+/// block (`tests/replay.rs`); what is lost is who renders what, and how fast.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Event {
     /// A user submitted a job. Answered by [`crate::Effect::Submitted`] or
@@ -32,15 +35,8 @@ pub enum Event {
         block: BlockRef,
         /// How long one thread took to render it.
         elapsed: Span,
-    },
-    /// A worker could not render a tile. The attempt ends.
-    TileFailed {
-        /// The worker that says so; it must be the attempt's.
-        worker: WorkerId,
-        /// The attempt.
-        attempt: AttemptId,
-        /// Why, a sentence for the user.
-        reason: String,
+        /// A digest of its pixels: those of one block are equal to the bit, whoever renders it.
+        pixels: Digest,
     },
     /// An image is encoded, synced and in its place.
     ImageEncoded {
@@ -49,17 +45,20 @@ pub enum Event {
         /// Its film digest.
         film: Digest,
     },
-    /// An image could not be stored or encoded; the job goes on without it.
+    /// An image could not be stored or encoded, or [`crate::Effect::GiveUp`] was heard; the job goes on without it.
     ImageFailed {
         /// The image.
         image: ImageRef,
         /// Why, a sentence for the user.
         reason: String,
     },
-    /// A user ends a job. Nothing happens where it is over already.
-    Cancel {
+    /// A user wants something of a job. Answered by [`crate::Effect::Commanded`] or
+    /// [`crate::Effect::CommandRefused`].
+    Command {
         /// The job.
         job: JobId,
+        /// What is wanted.
+        command: Command,
     },
     /// A worker said hello on a new link, for the first time or again.
     ///
@@ -69,10 +68,8 @@ pub enum Event {
         worker: WorkerId,
         /// The link it came on; replaces any older link of the same worker.
         link: LinkId,
-        /// Its renderer's revision.
-        revision: Revision,
-        /// Its render threads, at least 1.
-        threads: u32,
+        /// What it offers; replaces what it offered before.
+        offer: Offer,
         /// The attempts that it still has from before a broken link.
         held: Vec<AttemptId>,
     },
@@ -90,6 +87,15 @@ pub enum Event {
         /// What it has started, and how far it is: those that it renders, and those
         /// of which blocks are still to be delivered. An attempt held ahead is not named.
         running: Vec<Running>,
+    },
+    /// A worker could not render a tile. The attempt ends, and the tile is tried elsewhere.
+    TileFailed {
+        /// The worker that says so; it must be the attempt's.
+        worker: WorkerId,
+        /// The attempt.
+        attempt: AttemptId,
+        /// Why, a sentence for the user.
+        reason: String,
     },
     /// A worker will not render these tiles.
     GivenBack {
@@ -115,6 +121,27 @@ pub enum Event {
     /// Only this ends anything by a limit. A shell that was held up feeds what had
     /// already arrived before it, so that nobody is blamed for the coordinator's own pause.
     Tick,
+}
+
+impl Event {
+    /// Whether a journal must hold it before its effects are performed.
+    pub fn is_durable(&self) -> bool {
+        match self {
+            Self::Submit(_)
+            | Self::BlockStored { .. }
+            | Self::ImageEncoded { .. }
+            | Self::ImageFailed { .. }
+            | Self::Command { .. } => true,
+            Self::WorkerJoined { .. }
+            | Self::Credit { .. }
+            | Self::Heartbeat { .. }
+            | Self::TileFailed { .. }
+            | Self::GivenBack { .. }
+            | Self::LinkClosed { .. }
+            | Self::Goodbye { .. }
+            | Self::Tick => false,
+        }
+    }
 }
 
 /// One link of a worker, numbered by the shell; a newer link has a larger number.
@@ -149,6 +176,15 @@ pub struct Submission {
     pub window: Rect,
     /// How images are cut.
     pub tiles: TileShape,
+    /// Jobs of higher priority are served first; usually 0.
+    pub priority: i32,
+    /// Its part of the farm against the other jobs of its priority, at least 1: one of share 2 holds
+    /// twice as many tiles at a time as one of share 1.
+    pub share: u32,
+    /// What it asks of its workers.
+    pub needs: Needs,
+    /// Jobs that must be finished before it begins.
+    pub after: Vec<JobId>,
 }
 
 /// How an image's window is cut into tiles.
@@ -165,5 +201,11 @@ pub enum TileShape {
         width: u32,
         /// Rows, at least 1.
         height: u32,
+    },
+    /// Whole grid squares, as many as one thread is expected to render in some time, by what the
+    /// squares of the image before took. Smaller ones towards the end of the job.
+    Time {
+        /// How long a tile should take; the scheduler's own where absent.
+        aim: Option<Span>,
     },
 }

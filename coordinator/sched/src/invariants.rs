@@ -1,23 +1,27 @@
 //! What always holds, in code.
 
 use crate::attempt::Phase;
+use crate::market::Stage;
+use crate::tile::LIVE_MAX;
 use crate::timers::Timer;
-use crate::work::LIVE_MAX;
-use crate::{ImageState, Link, Sched};
+use crate::{ImageState, JobOutcome, Link, Sched};
 
 impl Sched {
     /// Looks at the whole state and asserts what must hold between two events.
     ///
-    /// For tests: it costs as much as all tiles in flight together.
+    /// For tests: it costs as much as all that waits in flight together, and as all workers and jobs
+    /// multiplied with each other.
     ///
     /// # Panics
     ///
     /// Where something does not hold, which is a mistake in this crate.
     pub fn check_invariants(&self) {
         self.check_jobs();
+        self.check_waiting();
         self.check_tiles();
         self.check_attempts();
         self.check_workers();
+        self.check_market();
         assert!(self.changed.is_empty(), "every change was reported");
     }
 
@@ -29,22 +33,53 @@ impl Sched {
             "each job that is over is in the list once"
         );
         assert_eq!(self.submissions.len(), self.jobs.len());
+        let images = self.jobs.values().map(|job| job.spec.frames.count());
+        assert_eq!(images.sum::<u32>(), self.images);
         for (&id, job) in &self.jobs {
             let counts = job.view().images;
             let total = counts.waiting + counts.rendering + counts.encoding;
             let ended = counts.encoded + counts.failed + counts.dropped;
             assert_eq!(total + ended, job.spec.frames.count());
             assert!(!job.is_over() || (total == 0 && job.work.is_empty()));
-            assert!(counts.rendering + counts.encoding <= self.config.images_in_flight_max.max(1));
             assert_eq!(job.work.len(), counts.rendering as usize);
             assert_eq!(job.ends().is_some(), job.is_over() && counts.dropped == 0);
-            assert!(job.tally.pixels_done <= job.view().pixels);
-            let has_tiles = job.has_tiles(&self.config);
-            assert_eq!(self.market.has_job(job.spec.revision, id), has_tiles);
+            assert_eq!(job.tally.attempts_live as usize, job.live().count());
+            let waits = (0..job.spec.frames.count()).filter(|&place| job.waits(place));
             assert!(
-                !self.market.is_open(job.spec.revision),
-                "what can be leased is"
+                waits
+                    .clone()
+                    .all(|place| job.state(place) == ImageState::Waiting),
+                "what is next has not begun"
             );
+            if job.outcome != Some(JobOutcome::Cancelled) {
+                assert_eq!(waits.count(), counts.waiting as usize);
+            }
+            let pixels: u64 = job.work.values().map(|work| work.pixels.count()).sum();
+            let whole = u64::from(counts.encoding + counts.encoded) * job.spec.window.area();
+            assert_eq!(
+                job.tally.pixels_done,
+                pixels + whole,
+                "no pixel is counted twice"
+            );
+            assert_eq!(
+                job.seat,
+                job.stands(&self.config),
+                "job {id} stands where it belongs"
+            );
+        }
+    }
+
+    /// Whoever waits for a job is known to it, and waits for one that is not finished.
+    fn check_waiting(&self) {
+        for (before, by) in &self.waited_for {
+            assert!(!by.is_empty());
+            let before_outcome = self.jobs[before].outcome;
+            assert_ne!(before_outcome, Some(JobOutcome::Finished));
+            assert!(by.iter().all(|next| self.jobs[next].after.contains(before)));
+        }
+        for (id, job) in &self.jobs {
+            let knows = |before| self.waited_for[before].contains(id);
+            assert!(job.after.iter().all(knows));
         }
     }
 
@@ -52,29 +87,35 @@ impl Sched {
         for job in self.jobs.values() {
             for (&place, work) in &job.work {
                 assert_eq!(job.state(place), ImageState::Rendering);
-                assert!(!work.pixels.is_complete(), "a complete image is encoded");
-                let mut missing = 0;
-                let mut live = 0;
-                for (index, tile) in (0..).zip(&work.tiles) {
-                    missing += tile.missing;
-                    live += tile.attempts().count();
-                    let rect = work.rect(index);
-                    let blocks = rect.blocks().filter(|&block| !work.pixels.covers(block));
-                    assert!((tile.missing == 0) == (blocks.count() == 0));
-                    let away = tile.attempts().all(|number| {
-                        self.workers[&self.attempts[&number].worker].link == Link::Closed
-                    });
-                    let open = tile.missing > 0 && tile.attempts().count() < LIVE_MAX && away;
+                work.check();
+                for (number, tile) in work.tiles.iter() {
+                    assert!(tile.live_count() <= LIVE_MAX);
+                    let is_away =
+                        |number| self.workers[self.attempts[&number].worker].link == Link::Closed;
+                    let away = tile.attempts().all(is_away);
                     assert_eq!(
-                        work.is_open(index),
-                        open,
-                        "a tile waits where nobody renders it"
+                        work.is_shared(number),
+                        away && tile.live_count() < LIVE_MAX,
+                        "a tile is open where nobody who can be reached renders it"
                     );
+                    for attempt in tile.attempts() {
+                        let enlisted = self.attempts[&attempt].enlisted;
+                        let alone = tile.live_count() == 1 && !work.is_shared(number);
+                        assert!(
+                            enlisted.is_none() || alone,
+                            "only one that is alone is helped"
+                        );
+                    }
                 }
-                assert_eq!(missing + work.pixels.count(), job.spec.window.area());
-                assert_eq!(live, work.live.len());
+            }
+            for &(key, number) in &job.ending {
+                assert_eq!(self.attempts[&number].enlisted, Some(key));
             }
         }
+        let listed = self.jobs.values().map(|job| job.ending.len());
+        let enlisted = self.attempts.values();
+        let enlisted = enlisted.filter(|attempt| attempt.enlisted.is_some());
+        assert_eq!(listed.sum::<usize>(), enlisted.count());
     }
 
     fn check_attempts(&self) {
@@ -83,51 +124,81 @@ impl Sched {
             let place = job
                 .place(attempt.image.image)
                 .expect("its image is the job's");
-            let work = &job.work[&place];
-            assert!(work.live.contains(&number));
-            let tile = &work.tiles[attempt.tile as usize];
-            assert!(tile.missing > 0, "nobody renders a tile that is done");
+            let tile = job.work[&place].tiles.get(attempt.tile);
+            let tile = tile.expect("its tile is there");
+            assert_eq!(tile.rect, attempt.rect);
             assert_eq!(tile.attempts().filter(|&live| live == number).count(), 1);
-            let worker = &self.workers[&attempt.worker];
+            let worker = &self.workers[attempt.worker];
             assert!(worker.live.contains(&number));
             assert_eq!(
-                worker.revision, job.spec.revision,
+                worker.offer.revision, job.spec.revision,
                 "a lease goes to the pinned revision"
             );
             // Every lease ends: a limit is set for each.
-            assert_eq!(attempt.phase == Phase::Running, attempt.stuck.is_some());
-            if let Some(due) = attempt.stuck {
-                assert!(self.timers.contains(due, Timer::Stuck(number)));
-            }
+            let runs = attempt.phase == Phase::Running;
+            assert_eq!(runs, attempt.stuck.due().is_some());
         }
     }
 
     fn check_workers(&self) {
-        let mut timers = self
-            .attempts
-            .values()
-            .filter(|attempt| attempt.phase == Phase::Running)
-            .count();
+        let stuck = self.attempts.iter();
+        let mut timers: usize = stuck
+            .map(|(&number, attempt)| self.timers.check(Timer::Stuck(number), attempt.stuck))
+            .sum();
         let mut live = 0;
-        for (&id, worker) in &self.workers {
+        let mut capacity = 0;
+        for (place, worker) in self.workers.iter() {
             live += worker.live.len();
+            assert!(worker.live.is_sorted());
             let running = |number: &&u64| self.attempts[*number].phase == Phase::Running;
             let idle = worker.live.len() - worker.live.iter().filter(running).count();
             assert_eq!(idle, worker.idle as usize);
-            assert_eq!(worker.waiting.is_some(), worker.is_idle());
-            assert_eq!(worker.load, worker.wants());
-            assert!(
-                worker
-                    .lost
-                    .is_some_and(|due| self.timers.contains(due, Timer::Lost(id)))
-            );
-            timers += 1 + usize::from(worker.waiting.is_some());
+            let costs = worker.live.iter().map(|number| self.attempts[number].cost);
+            assert_eq!(costs.sum::<u64>(), worker.backlog);
+            assert_eq!(worker.kinds, self.kinds.served_by(&worker.offer));
+            assert_eq!(worker.waiting.due().is_some(), worker.is_idle());
+            assert_eq!(worker.seat, worker.wants(place));
+            assert_eq!(worker.counted, worker.counts());
+            capacity += worker.counted.map_or(0, |(_, capacity)| capacity);
+            assert!(worker.lost.due().is_some());
+            let is_aside = worker.aside.farm().is_some() || worker.aside.jobs().next().is_some();
+            assert_eq!(worker.aside.alarm.due().is_some(), is_aside);
+            timers += self.timers.check(Timer::Lost(place), worker.lost);
+            timers += self.timers.check(Timer::Waiting(place), worker.waiting);
+            timers += self.timers.check(Timer::LetBack(place), worker.aside.alarm);
         }
+        assert_eq!(capacity, self.capacity);
         assert_eq!(
             live,
             self.attempts.len(),
             "every live attempt is some worker's"
         );
         assert_eq!(timers, self.timers.len(), "no timer is left behind");
+    }
+
+    /// What can be leased is.
+    fn check_market(&self) {
+        for (id, job) in &self.jobs {
+            let able = self.workers.iter();
+            let able =
+                able.filter(|(_, worker)| worker.is_able() && worker.kinds.contains(job.kind));
+            assert_eq!(able.count(), self.kinds.able(job.kind) as usize);
+            let aside = self.workers.iter();
+            let aside = aside.filter(|(_, worker)| worker.aside.job(*id).is_some());
+            assert_eq!(aside.count(), job.aside as usize);
+            if !job.seat.is_some_and(|(stage, _)| stage == Stage::Open) {
+                continue;
+            }
+            for (place, worker) in self.workers.iter() {
+                let wants = worker.seat.is_some() && worker.kinds.contains(job.kind);
+                assert!(
+                    !wants || !self.may_take(place, *id),
+                    "what can be leased is"
+                );
+            }
+        }
+        let used: alloc::collections::BTreeSet<_> =
+            self.jobs.values().map(|job| job.kind).collect();
+        assert_eq!(used.len(), self.kinds.len(), "no kind is left behind");
     }
 }

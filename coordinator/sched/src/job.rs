@@ -2,48 +2,78 @@
 
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::String;
+use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use model::rect::GRID_SQUARE;
-use model::{ImageNumber, ImageRef, JobId, Span, Timestamp};
+use model::{ImageNumber, ImageRef, JobId, Rect, Span, Timestamp};
 
+use crate::costs::Costs;
+use crate::market::{Rank, Stage};
+use crate::needs::Kind;
+use crate::pace::time_of;
+use crate::places::Places;
 use crate::tiling::TileGrid;
-use crate::work::Work;
+use crate::view::Paused;
+use crate::work::{Amount, Ask, Work};
 use crate::{
     Config, ImageCounts, ImageFailure, ImageState, ImageView, JobOutcome, JobState, JobView,
     Submission,
 };
 
-/// Pixels of a whole block.
-const BLOCK_PIXELS: u64 = (GRID_SQUARE * GRID_SQUARE) as u64;
-
 #[derive(Clone, Debug)]
 pub(crate) struct Job {
     pub(crate) id: JobId,
     pub(crate) spec: Submission,
-    pub(crate) grid: TileGrid,
+    pub(crate) kind: Kind,
+    pub(crate) shape: Shape,
     pub(crate) outcome: Option<JobOutcome>,
+    pub(crate) priority: i32,
+    pub(crate) share: u32,
+    pub(crate) paused: Paused,
+    /// Jobs that must be finished before it begins, and are not.
+    pub(crate) after: BTreeSet<JobId>,
+    focus: Option<Rect>,
     /// By place in the frame range.
     images: Vec<ImageState>,
     counts: ImageCounts,
-    /// Images from this place on have not been begun.
-    next: u32,
+    /// Images that wait, by place.
+    waiting: Places,
     /// Images being rendered, by place in the frame range.
     pub(crate) work: BTreeMap<u32, Work>,
     /// Images being encoded.
     encoding: BTreeSet<u32>,
     pub(crate) failures: Vec<ImageFailure>,
     pub(crate) tally: Tally,
+    pub(crate) costs: Costs,
+    /// Attempts that are their tile's only one, by when they are expected to be done.
+    pub(crate) ending: BTreeSet<(Timestamp, u64)>,
+    /// Workers that are set aside for it.
+    pub(crate) aside: u32,
+    /// Where it stands in the market.
+    pub(crate) seat: Option<(Stage, Rank)>,
+}
+
+/// How the images of a job are cut.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Shape {
+    /// What tiles are made of.
+    pub(crate) grid: TileGrid,
+    /// How long a tile should take; where absent, each cell is one.
+    pub(crate) aim: Option<Span>,
 }
 
 /// What a job has counted.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Tally {
     pub(crate) pixels_done: u64,
     pub(crate) blocks_done: u64,
     pub(crate) blocks_again: u64,
     pub(crate) pixels_again: u64,
+    pub(crate) blocks_twice: u64,
+    pub(crate) incidents: u64,
+    pub(crate) seconds: u64,
+    pub(crate) called_back: u64,
     pub(crate) render_time: Span,
     pub(crate) attempts_live: u32,
     pub(crate) attempts_failed: u64,
@@ -51,46 +81,54 @@ pub(crate) struct Tally {
     pub(crate) submitted: Timestamp,
     pub(crate) started: Option<Timestamp>,
     pub(crate) ended: Option<Timestamp>,
-    /// Pixels whose rendering was timed, and for how long.
-    timed: (u64, u64),
 }
 
 impl Job {
-    pub(crate) fn new(id: JobId, spec: Submission, grid: TileGrid, submitted: Timestamp) -> Self {
+    pub(crate) fn new(
+        id: JobId,
+        spec: Submission,
+        (kind, shape): (Kind, Shape),
+        submitted: Timestamp,
+    ) -> Self {
         let count = spec.frames.count();
         Self {
             id,
-            grid,
+            kind,
+            shape,
             outcome: None,
+            priority: spec.priority,
+            share: spec.share,
+            paused: Paused::No,
+            after: BTreeSet::new(),
+            focus: None,
             images: vec![ImageState::Waiting; count as usize],
             counts: ImageCounts {
                 waiting: count,
                 ..ImageCounts::default()
             },
-            next: 0,
+            waiting: Places::all(count),
             work: BTreeMap::new(),
             encoding: BTreeSet::new(),
             failures: Vec::new(),
             tally: Tally {
-                pixels_done: 0,
-                blocks_done: 0,
-                blocks_again: 0,
-                pixels_again: 0,
-                render_time: Span(0),
-                attempts_live: 0,
-                attempts_failed: 0,
-                attempts_lost: 0,
                 submitted,
-                started: None,
-                ended: None,
-                timed: (0, 0),
+                ..Tally::default()
             },
+            costs: Costs::unknown(spec.window),
+            ending: BTreeSet::new(),
+            aside: 0,
+            seat: None,
             spec,
         }
     }
 
     pub(crate) fn is_over(&self) -> bool {
         self.outcome.is_some()
+    }
+
+    /// Whether it is neither over nor held up by its user or by another job.
+    pub(crate) fn goes_on(&self) -> bool {
+        !self.is_over() && self.paused == Paused::No && self.after.is_empty()
     }
 
     /// The place of an image in the frame range.
@@ -116,6 +154,10 @@ impl Job {
         *self.counts.of(*slot) -= 1;
         *self.counts.of(state) += 1;
         *slot = state;
+        match state {
+            ImageState::Waiting => self.waiting.insert(place),
+            _ => self.waiting.remove(place),
+        }
         if state == ImageState::Encoding {
             self.encoding.insert(place);
         } else {
@@ -123,30 +165,125 @@ impl Job {
         }
     }
 
-    /// Whether a worker could be given a tile.
-    pub(crate) fn has_tiles(&self, config: &Config) -> bool {
-        !self.is_over() && (self.may_begin(config) || self.work.values().any(Work::has_open))
+    /// Whether an image waits to be begun.
+    pub(crate) fn waits(&self, place: u32) -> bool {
+        self.waiting.contains(place)
     }
 
-    /// The next tile in order, as (place of its image, tile); an image is begun where none in flight has one.
-    pub(crate) fn take_tile(&mut self, config: &Config) -> Option<(u32, u32)> {
-        let open = self
-            .work
-            .iter_mut()
-            .find_map(|(&place, work)| work.take_open().map(|tile| (place, tile)));
-        if open.is_some() || !self.may_begin(config) {
-            return open;
+    /// Where it belongs in the market.
+    pub(crate) fn stands(&self, config: &Config) -> Option<(Stage, Rank)> {
+        let stage = if !self.goes_on() {
+            None
+        } else if self.has_tiles(config) {
+            Some(Stage::Open)
+        } else if !self.ending.is_empty() {
+            Some(Stage::Ending)
+        } else {
+            None
+        };
+        let rank = Rank::new(self.priority, self.tally.attempts_live, self.share, self.id);
+        Some((stage?, rank))
+    }
+
+    /// Whether some worker could be given a tile.
+    pub(crate) fn has_tiles(&self, config: &Config) -> bool {
+        self.may_begin(config) || self.work.values().any(Work::has_open)
+    }
+
+    /// Whether this worker could be.
+    pub(crate) fn has_for(&self, ask: &Ask, config: &Config) -> bool {
+        self.work.values().any(|work| work.has_for(ask)) || self.may_begin_for(ask, config)
+    }
+
+    /// The next tile for a worker, as (place of its image, tile): in the region of interest first, then
+    /// in order; an image is begun where none in flight has one.
+    pub(crate) fn take_tile(&mut self, ask: &Ask, config: &Config) -> Option<(u32, u32)> {
+        let take = |(&place, work): (&u32, &mut Work)| Some((place, work.take(ask)?));
+        let mut focused = self.work.iter_mut().filter(|(_, work)| work.has_focused());
+        if let Some(found) = focused.find_map(take) {
+            return Some(found);
         }
-        let place = self.next;
-        self.next += 1;
+        if let Some(found) = self.work.iter_mut().find_map(take) {
+            return Some(found);
+        }
+        let place = self.waiting.first();
+        let place = place.filter(|_| self.may_begin_for(ask, config))?;
+        let tile = self.begin(place).take(ask)?;
+        Some((place, tile))
+    }
+
+    /// Begins an image that waits.
+    pub(crate) fn begin(&mut self, place: u32) -> &mut Work {
         self.set_state(place, ImageState::Rendering);
-        let work = self.work.entry(place).or_insert(Work::new(self.grid));
-        work.take_open().map(|tile| (place, tile))
+        let map = self.costs.map(self.shape.grid).map(Arc::new);
+        let work = Work::new(self.shape.grid, map, self.focus);
+        self.work.entry(place).or_insert(work)
     }
 
     fn may_begin(&self, config: &Config) -> bool {
         let in_flight = self.counts.rendering + self.counts.encoding;
-        self.next < self.spec.frames.count() && in_flight < config.images_in_flight_max.max(1)
+        self.waiting.count() > 0 && in_flight < config.images_in_flight_max.max(1)
+    }
+
+    /// Whether an image may be begun for a worker. Not for one whose time is too short for what there is.
+    fn may_begin_for(&self, ask: &Ask, config: &Config) -> bool {
+        let fits = |fits: Amount| {
+            let cell = self.costs.mean(self.shape.grid.tile(0).area());
+            let is_short = cell.is_some_and(|cost| cost > fits.cost);
+            !is_short && !self.work.values().any(Work::has_open)
+        };
+        self.may_begin(config) && ask.fits.is_none_or(fits)
+    }
+
+    /// What all that waits for a worker is expected to cost, if anything was measured.
+    pub(crate) fn open_cost(&self) -> Option<u64> {
+        let of_image = self.costs.mean(self.spec.window.area())?;
+        let waiting = of_image.saturating_mul(u64::from(self.waiting.count()));
+        let in_flight = self.work.values().map(|work| match work.is_measured() {
+            true => work.open().cost,
+            false => self.costs.mean(work.open().pixels).unwrap_or(0),
+        });
+        Some(in_flight.fold(waiting, u64::saturating_add))
+    }
+
+    /// Moves what lies in a region to the front.
+    pub(crate) fn focus(&mut self, focus: Option<Rect>) {
+        self.focus = focus;
+        for work in self.work.values_mut() {
+            work.focus(focus);
+        }
+    }
+
+    /// Live attempts at any of its tiles.
+    pub(crate) fn live(&self) -> impl Iterator<Item = u64> {
+        let tiles = self.work.values().flat_map(|work| work.tiles.iter());
+        tiles.flat_map(|(_, tile)| tile.attempts())
+    }
+
+    /// Live attempts at the tiles of one image.
+    pub(crate) fn live_of(&self, place: u32) -> impl Iterator<Item = u64> {
+        let tiles = self.work.get(&place).into_iter();
+        let tiles = tiles.flat_map(|work| work.tiles.iter());
+        tiles.flat_map(|(_, tile)| tile.attempts())
+    }
+
+    /// Forgets the pixels of an image in flight.
+    pub(crate) fn drop_pixels(&mut self, place: u32) {
+        self.tally.pixels_done -= match self.work.remove(&place) {
+            Some(work) => work.pixels.count(),
+            None if self.state(place) == ImageState::Encoding => self.spec.window.area(),
+            None => 0,
+        };
+    }
+
+    /// Lets an image that is over wait again.
+    pub(crate) fn wait_again(&mut self, place: u32) {
+        if let ImageState::Encoded { .. } = self.state(place) {
+            self.tally.pixels_done -= self.spec.window.area();
+        }
+        let image = self.image_ref(place).image;
+        self.failures.retain(|failure| failure.image != image);
+        self.set_state(place, ImageState::Waiting);
     }
 
     /// The places of images that are being rendered or encoded.
@@ -177,28 +314,19 @@ impl Job {
         }
     }
 
-    /// Notes how long one thread took over some pixels.
-    pub(crate) fn time(&mut self, pixels: u64, elapsed: Span) {
-        let tally = &mut self.tally;
-        tally.render_time = Span(tally.render_time.0.saturating_add(elapsed.0));
-        tally.timed.0 = tally.timed.0.saturating_add(pixels);
-        tally.timed.1 = tally.timed.1.saturating_add(elapsed.0);
-    }
-
-    /// How long one thread is expected to take over some pixels: the mean so far.
-    pub(crate) fn expected(&self, pixels: u64) -> Option<Span> {
-        let (timed, micros) = self.tally.timed;
-        let micros = u128::from(micros) * u128::from(pixels) / u128::from(timed.max(1));
-        (timed > 0).then(|| Span(u64::try_from(micros).unwrap_or(u64::MAX)))
-    }
-
-    /// How long an attempt may take over one block, after so many others at its tile failed.
+    /// How long an attempt may take over one block on a worker of a speed, after so many others at
+    /// its tile failed; `cost` is what a block of the tile is expected to cost.
     ///
-    /// Each failure doubles it: a tile may be slower than the mean of its job by
+    /// Each failure doubles it: a tile may be slower than expected by
     /// more than the limit allows for, and must not fail for that.
-    pub(crate) fn block_limit(&self, config: &Config, failures: u32) -> Span {
-        let limit = match self.expected(BLOCK_PIXELS) {
-            Some(block) => block
+    pub(crate) fn block_limit(
+        &self,
+        config: &Config,
+        (cost, speed): (u64, u32),
+        failures: u32,
+    ) -> Span {
+        let limit = match self.costs.mean_square() {
+            Some(mean) => time_of(mean.max(cost), speed)
                 .times(config.progress_factor)
                 .max(config.progress_least),
             None => config.progress_unmeasured,
@@ -221,8 +349,15 @@ impl Job {
             revision: self.spec.revision,
             frames: self.spec.frames,
             window: self.spec.window,
-            tile_size: self.grid.size(),
-            tiles_per_image: u32::try_from(self.grid.count()).unwrap_or(u32::MAX),
+            tiles: self.shape.aim.is_none().then(|| {
+                let count = u32::try_from(self.shape.grid.count());
+                (self.shape.grid.size(), count.unwrap_or(u32::MAX))
+            }),
+            priority: self.priority,
+            share: self.share,
+            paused: self.paused,
+            focus: self.focus,
+            after: &self.after,
             state: self.outcome.map_or(JobState::Running, JobState::Over),
             images,
             pixels_done: tally.pixels_done,
@@ -230,6 +365,10 @@ impl Job {
             blocks_done: tally.blocks_done,
             blocks_again: tally.blocks_again,
             pixels_again: tally.pixels_again,
+            blocks_twice: tally.blocks_twice,
+            incidents: tally.incidents,
+            seconds: tally.seconds,
+            called_back: tally.called_back,
             render_time: tally.render_time,
             attempts_live: tally.attempts_live,
             attempts_failed: tally.attempts_failed,

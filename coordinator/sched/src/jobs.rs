@@ -1,16 +1,15 @@
-//! What users do, and how images and jobs end.
+//! How jobs come, and how they end.
 
-use alloc::string::String;
 use alloc::vec::Vec;
 
 use model::rect::SIDE_MAX;
-use model::{Digest, ImageRef, JobId};
+use model::{ImageRef, JobId};
 
-use crate::job::Job;
+use crate::job::{Job, Shape};
+use crate::market::Stage;
+use crate::needs::{Forgotten, Interned, KINDS_MAX, Kind};
 use crate::tiling::{TileGrid, TileRule};
-use crate::{
-    Effect, ImageState, JobOutcome, RevokeReason, Sched, Submission, SubmitRefusal, TileShape,
-};
+use crate::{Effect, JobOutcome, RevokeReason, Sched, Submission, SubmitRefusal, TileShape};
 
 impl Sched {
     pub(crate) fn submit(&mut self, spec: Submission, out: &mut Vec<Effect>) {
@@ -29,19 +28,50 @@ impl Sched {
             let same = self.jobs.get(&id).is_some_and(|job| job.spec == spec);
             return same.then_some(id).ok_or(SubmitRefusal::SubmissionReused);
         }
-        let grid = self.check(&spec)?;
+        self.check(&spec)?;
+        let shape = self.shape(&spec)?;
         self.make_room(spec.frames.count(), out)?;
+        let kind = self.kind_of(&spec)?;
 
         self.jobs_made += 1;
         let id = JobId(self.jobs_made);
         self.images += spec.frames.count();
         self.submissions.insert(spec.submission, id);
-        self.jobs.insert(id, Job::new(id, spec, grid, self.now));
+        let mut job = Job::new(id, spec, (kind, shape), self.now);
+        for &after in &job.spec.after {
+            let before = self.jobs.get(&after).and_then(|before| before.outcome);
+            if before != Some(JobOutcome::Finished) {
+                job.after.insert(after);
+                self.waited_for.entry(after).or_default().insert(id);
+            }
+        }
+        self.jobs.insert(id, job);
         self.job_changed(id);
         Ok(id)
     }
 
-    fn check(&self, spec: &Submission) -> Result<TileGrid, SubmitRefusal> {
+    /// The kind of one more job. A kind that is new costs a look at every worker.
+    fn kind_of(&mut self, spec: &Submission) -> Result<Kind, SubmitRefusal> {
+        let kind = self.kinds.add(spec.revision, &spec.needs);
+        let max = u32::try_from(KINDS_MAX).unwrap_or(u32::MAX);
+        let kind = match kind.ok_or(SubmitRefusal::TooManyKinds { max })? {
+            Interned::Known(kind) => return Ok(kind),
+            Interned::New(kind) => kind,
+        };
+        self.offer_anew();
+        Ok(kind)
+    }
+
+    /// Matches every worker with the kinds that there are.
+    fn offer_anew(&mut self) {
+        for place in self.workers.places().collect::<Vec<_>>() {
+            let worker = &mut self.workers[place];
+            worker.kinds = self.kinds.served_by(&worker.offer);
+            self.worker_changed(place);
+        }
+    }
+
+    fn check(&self, spec: &Submission) -> Result<(), SubmitRefusal> {
         let limits = &self.config.limits;
         if let Some(ours) = self.config.revision.filter(|&ours| ours != spec.revision) {
             let asked = spec.revision;
@@ -63,7 +93,41 @@ impl Sched {
         if pixels > max {
             return Err(SubmitRefusal::WindowTooLarge { pixels, max });
         }
+        if spec.share == 0 || spec.share > limits.share_max {
+            let max = limits.share_max;
+            return Err(SubmitRefusal::ShareOutside { max });
+        }
+        let (labels_max, bytes_max) = (limits.labels_max, limits.label_bytes_max);
+        if !limits.allow_labels(&spec.needs.labels) {
+            return Err(SubmitRefusal::TooManyLabels {
+                labels_max,
+                bytes_max,
+            });
+        }
+        if spec.after.len() > limits.after_max as usize {
+            let max = limits.after_max;
+            return Err(SubmitRefusal::TooManyAfter { max });
+        }
+        match spec
+            .after
+            .iter()
+            .find(|after| !self.jobs.contains_key(after))
+        {
+            Some(&job) => Err(SubmitRefusal::UnknownJob { job }),
+            None => Ok(()),
+        }
+    }
+
+    fn shape(&self, spec: &Submission) -> Result<Shape, SubmitRefusal> {
+        let limits = &self.config.limits;
+        let window = spec.window;
         let size = match spec.tiles {
+            TileShape::Time { aim } => {
+                return Ok(Shape {
+                    grid: TileGrid::squares(window),
+                    aim: Some(aim.unwrap_or(self.config.tile_time)),
+                });
+            }
             TileShape::Rule { min_tile_pixels } => TileRule {
                 min_tile_pixels: min_tile_pixels.unwrap_or(self.config.min_tile_pixels),
                 max_array_size: self.config.max_array_size,
@@ -83,7 +147,7 @@ impl Sched {
         if tiles > max {
             return Err(SubmitRefusal::TooManyTiles { tiles, max });
         }
-        Ok(grid)
+        Ok(Shape { grid, aim: None })
     }
 
     /// Sees that another job of so many images can be remembered; jobs that are over make room.
@@ -94,55 +158,18 @@ impl Sched {
             return Err(SubmitRefusal::TooManyJobs { max });
         }
         let images_max = limits.images_max;
+        let is_free = |id: &&JobId| !self.waited_for.contains_key(id);
         let of_over = |id| self.jobs[id].spec.frames.count();
-        let left = images_max - self.images + self.over.iter().map(of_over).sum::<u32>();
-        while asked <= left && asked > images_max - self.images {
-            self.forget_oldest(out);
-        }
+        let over: u32 = self.over.iter().filter(is_free).map(of_over).sum();
+        let left = images_max - self.images + over;
+        while asked <= left && asked > images_max - self.images && self.forget_oldest(out) {}
         if asked > left {
             return Err(SubmitRefusal::TooManyImages { asked, left });
         }
         Ok(())
     }
 
-    pub(crate) fn image_encoded(&mut self, image: ImageRef, film: Digest, out: &mut Vec<Effect>) {
-        let Some((job, place)) = self.job_and_place(image) else {
-            return;
-        };
-        if job.state(place) != ImageState::Encoding {
-            return;
-        }
-        job.set_state(place, ImageState::Encoded { film });
-        self.job_changed(image.job);
-        self.end_job_if_done(image.job, out);
-    }
-
-    pub(crate) fn image_failed(&mut self, image: ImageRef, reason: String, out: &mut Vec<Effect>) {
-        let Some((job, place)) = self.job_and_place(image) else {
-            return;
-        };
-        let in_flight = matches!(
-            job.state(place),
-            ImageState::Rendering | ImageState::Encoding
-        );
-        if in_flight && !job.is_over() {
-            self.fail_image(image, reason, out);
-        }
-    }
-
-    /// Gives up an image in flight; the job goes on with the others.
-    pub(crate) fn fail_image(&mut self, image: ImageRef, reason: String, out: &mut Vec<Effect>) {
-        self.drop_work(image, RevokeReason::ImageFailed, out);
-        if let Some(job) = self.jobs.get_mut(&image.job)
-            && let Some(place) = job.place(image.image)
-        {
-            job.set_state(place, ImageState::Failed);
-            job.blame(place, reason, &self.config);
-        }
-        self.job_changed(image.job);
-        self.end_job_if_done(image.job, out);
-    }
-
+    /// Ends a job that is not over.
     pub(crate) fn cancel(&mut self, id: JobId, out: &mut Vec<Effect>) {
         let Some(job) = self.jobs.get(&id).filter(|job| !job.is_over()) else {
             return;
@@ -159,27 +186,7 @@ impl Sched {
         self.end_job(id, JobOutcome::Cancelled, out);
     }
 
-    /// Ends all attempts at an image in flight, and lets the shell forget its pixels.
-    fn drop_work(&mut self, image: ImageRef, reason: RevokeReason, out: &mut Vec<Effect>) {
-        let Some((job, place)) = self.job_and_place(image) else {
-            return;
-        };
-        let live: Vec<u64> = job
-            .work
-            .get(&place)
-            .into_iter()
-            .flat_map(|work| work.live.iter().copied())
-            .collect();
-        for number in live {
-            self.revoke(number, reason, out);
-        }
-        if let Some(job) = self.jobs.get_mut(&image.job) {
-            job.work.remove(&place);
-        }
-        out.push(Effect::DropScratch { image });
-    }
-
-    fn end_job_if_done(&mut self, id: JobId, out: &mut Vec<Effect>) {
+    pub(crate) fn end_job_if_done(&mut self, id: JobId, out: &mut Vec<Effect>) {
         let job = self.jobs.get(&id).filter(|job| !job.is_over());
         if let Some(outcome) = job.and_then(Job::ends) {
             self.end_job(id, outcome, out);
@@ -187,36 +194,80 @@ impl Sched {
     }
 
     fn end_job(&mut self, id: JobId, outcome: JobOutcome, out: &mut Vec<Effect>) {
-        if let Some(job) = self.jobs.get_mut(&id) {
-            job.outcome = Some(outcome);
-            job.tally.ended = Some(self.now);
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        job.outcome = Some(outcome);
+        job.tally.ended = Some(self.now);
+        for before in core::mem::take(&mut job.after) {
+            self.waits_no_more(id, before);
+        }
+        if outcome == JobOutcome::Finished {
+            for next in self.waited_for.remove(&id).unwrap_or_default() {
+                if let Some(job) = self.jobs.get_mut(&next) {
+                    job.after.remove(&id);
+                }
+                self.job_changed(next);
+            }
         }
         self.over.push_back(id);
         self.job_changed(id);
         out.push(Effect::JobDone { job: id, outcome });
-        while self.over.len() > self.config.limits.jobs_kept_max as usize {
-            self.forget_oldest(out);
+        while self.over.len() > self.config.limits.jobs_kept_max as usize && self.forget_oldest(out)
+        {
         }
     }
 
-    fn forget_oldest(&mut self, out: &mut Vec<Effect>) {
-        let Some(id) = self.over.pop_front() else {
-            return;
+    /// A job no longer waits for another one.
+    fn waits_no_more(&mut self, job: JobId, before: JobId) {
+        if let Some(by) = self.waited_for.get_mut(&before) {
+            by.remove(&job);
+            if by.is_empty() {
+                self.waited_for.remove(&before);
+            }
+        }
+    }
+
+    /// Forgets the job that has been over for longest, of those that no other waits for; says whether there was one.
+    fn forget_oldest(&mut self, out: &mut Vec<Effect>) -> bool {
+        let is_free = |id: &JobId| !self.waited_for.contains_key(id);
+        let oldest = self.over.iter().position(is_free);
+        let Some(id) = oldest.and_then(|index| self.over.remove(index)) else {
+            return false;
         };
-        if let Some(job) = self.jobs.remove(&id) {
+        self.forget_job(id, out);
+        true
+    }
+
+    /// Forgets a job that is over.
+    pub(crate) fn forget_job(&mut self, id: JobId, out: &mut Vec<Effect>) {
+        if let Some(mut job) = self.jobs.remove(&id) {
             self.images -= job.spec.frames.count();
             self.submissions.remove(&job.spec.submission);
+            self.market.place_job(job.kind, &mut job.seat, None);
+            if self.kinds.remove(job.kind) == Forgotten::Yes {
+                self.offer_anew();
+            }
         }
         self.changed.remove(&id);
         out.push(Effect::ForgetJob { job: id });
     }
 
-    /// Sees that the job stands where it belongs in the market, and that watchers hear of it.
+    /// Watchers are to hear of a job, and it may belong elsewhere in the market.
     pub(crate) fn job_changed(&mut self, id: JobId) {
-        if let Some(job) = self.jobs.get(&id) {
-            self.market
-                .place_job(job.spec.revision, id, job.has_tiles(&self.config));
+        if self.jobs.contains_key(&id) {
             self.changed.insert(id);
+        }
+    }
+
+    /// Sees that a job stands where it belongs in the market.
+    pub(crate) fn settle_job(&mut self, id: JobId) {
+        if let Some(job) = self.jobs.get_mut(&id) {
+            let place = job.stands(&self.config);
+            self.market.place_job(job.kind, &mut job.seat, place);
+            if place.is_some_and(|(stage, _)| stage == Stage::Open) {
+                self.market.touch_kind(job.kind);
+            }
         }
     }
 

@@ -16,30 +16,45 @@
 
 extern crate alloc;
 
+mod aside;
 mod attempt;
 mod attempts;
+mod blocks;
+mod command;
 mod config;
+mod costs;
 mod effect;
 mod event;
+mod images;
 mod invariants;
 mod job;
 mod jobs;
+mod leasing;
 mod links;
 mod market;
+mod needs;
+mod pace;
 mod pixels;
+mod places;
 mod refusal;
+mod region;
+mod roster;
 mod sched;
+mod tail;
+mod tile;
 mod tiling;
 mod timers;
 mod view;
 mod work;
 mod worker;
 
-pub use config::{Config, Limits};
+pub use command::Command;
+pub use config::{Config, Limits, TailGain};
 pub use effect::{Effect, JobOutcome, RevokeReason};
 pub use event::{BlockRef, Event, LinkId, Submission, TileShape};
-pub use refusal::{BlockRefusal, SubmitRefusal, Verdict, WorkerRefusal};
+pub use needs::{Needs, Offer};
+pub use refusal::{BlockRefusal, CommandRefusal, SubmitRefusal, Verdict, WorkerRefusal};
 pub use sched::Sched;
 pub use view::{
-    ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, WorkerView,
+    ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused, WorkerView,
 };

@@ -3,73 +3,78 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use model::{AttemptId, Revision, Running, Span, WorkerId};
+use model::{AttemptId, Running, Span, WorkerId};
 
 use crate::attempt::Phase;
+use crate::needs::Comes;
+use crate::roster::Place;
 use crate::timers::Timer;
 use crate::worker::Worker;
-use crate::{Effect, Link, LinkId, RevokeReason, Sched, WorkerRefusal};
+use crate::{Effect, Link, LinkId, Offer, RevokeReason, Sched, WorkerRefusal};
 
 impl Sched {
     pub(crate) fn worker_joined(
         &mut self,
         id: WorkerId,
-        (link, revision, threads): (LinkId, Revision, u32),
+        (link, offer): (LinkId, Offer),
         held: &[AttemptId],
         out: &mut Vec<Effect>,
     ) {
-        if self
-            .workers
-            .get(&id)
-            .is_some_and(|known| link < known.newest)
-        {
+        let known = self.workers.place(id);
+        if known.is_some_and(|place| link < self.workers[place].newest) {
             return;
         }
-        if let Err(refusal) = self.admit_worker(id, revision, threads) {
+        if let Err(refusal) = self.admit_worker(id, &offer) {
             out.push(Effect::WorkerRefused {
                 worker: id,
                 refusal,
             });
             return;
         }
-        let now = self.now;
-        let worker = self
-            .workers
-            .entry(id)
-            .or_insert_with(|| Worker::new(revision, threads, link, now));
+        let place = known.unwrap_or_else(|| {
+            let worker = Worker::new(id, offer.clone(), link, self.now);
+            self.workers.insert(worker)
+        });
+        let worker = &mut self.workers[place];
         if link > worker.newest {
             // The worker says anew what it wants, when it has read what is still its own.
             worker.credit = 0;
         }
         worker.newest = link;
         worker.link = Link::Open;
-        worker.threads = threads;
+        worker.kinds = self.kinds.served_by(&offer);
+        worker.ends = offer.time_left.map(|left| self.now + left);
+        worker.offer = offer;
         self.heard(id);
         let live: Vec<AttemptId> = held
             .iter()
             .copied()
             .filter(|&attempt| self.owned(id, attempt).is_some())
             .collect();
-        self.keep_only(id, &live);
+        self.keep_only(place, &live);
         out.push(Effect::Welcome { worker: id, live });
-        self.worker_changed(id);
+        self.worker_changed(place);
     }
 
-    fn admit_worker(
-        &self,
-        id: WorkerId,
-        theirs: Revision,
-        threads: u32,
-    ) -> Result<(), WorkerRefusal> {
-        let known = self.workers.get(&id);
-        let wanted = self.config.revision.or(known.map(|known| known.revision));
+    fn admit_worker(&self, id: WorkerId, offer: &Offer) -> Result<(), WorkerRefusal> {
+        let known = self.workers.by_id(id);
+        let theirs = offer.revision;
+        let wanted = self.config.revision;
+        let wanted = wanted.or(known.map(|known| known.offer.revision));
         if let Some(wanted) = wanted.filter(|&wanted| wanted != theirs) {
             return Err(WorkerRefusal::WrongRevision { theirs, wanted });
         }
-        if threads == 0 {
+        if offer.threads == 0 {
             return Err(WorkerRefusal::NoThreads);
         }
-        let max = self.config.limits.workers_max;
+        let limits = &self.config.limits;
+        if !limits.allow_labels(&offer.labels) {
+            return Err(WorkerRefusal::TooManyLabels {
+                labels_max: limits.labels_max,
+                bytes_max: limits.label_bytes_max,
+            });
+        }
+        let max = limits.workers_max;
         if known.is_none() && self.workers.len() >= max as usize {
             return Err(WorkerRefusal::TooMany { max });
         }
@@ -78,9 +83,9 @@ impl Sched {
 
     /// Ends a worker's attempts that it does not have (their lease was lost on the
     /// way), and takes up the others where they are.
-    fn keep_only(&mut self, id: WorkerId, held: &[AttemptId]) {
+    fn keep_only(&mut self, place: Place, held: &[AttemptId]) {
         let held: alloc::collections::BTreeSet<u64> = held.iter().map(|id| id.number).collect();
-        for number in self.attempts_of(id) {
+        for number in self.workers[place].live.clone() {
             if !held.contains(&number) {
                 self.end_attempt(number);
             } else if let Some(attempt) = self.attempts.get(&number) {
@@ -90,16 +95,14 @@ impl Sched {
     }
 
     pub(crate) fn credit(&mut self, id: WorkerId, credit: u32) {
-        self.heard(id);
-        if let Some(worker) = self.workers.get_mut(&id) {
-            worker.credit = credit.min(self.config.limits.credit_max);
+        if let Some(place) = self.heard(id) {
+            self.workers[place].credit = credit.min(self.config.limits.credit_max);
+            self.worker_changed(place);
         }
-        self.worker_changed(id);
     }
 
     pub(crate) fn heartbeat(&mut self, id: WorkerId, running: &[Running], out: &mut Vec<Effect>) {
-        self.heard(id);
-        if !self.workers.contains_key(&id) {
+        if self.heard(id).is_none() {
             return;
         }
         for report in running {
@@ -124,19 +127,19 @@ impl Sched {
             return;
         };
         let attempt = self.attempts.get_mut(&number).expect("it has a limit");
-        let id = attempt.worker;
+        let place = attempt.worker;
         let (before, after) = (attempt.phase, attempt.phase_now());
         attempt.phase = after;
         attempt.limit = limit;
+        attempt.started.get_or_insert(self.now);
         let due = (after == Phase::Running).then(|| self.now + limit);
         self.timers
             .set(Timer::Stuck(number), &mut attempt.stuck, due);
-        if let Some(worker) = self.workers.get_mut(&id) {
-            worker.idle += u32::from(after != Phase::Running);
-            worker.idle -= u32::from(before != Phase::Running);
-            worker.patience = limit;
-        }
-        self.rearm_waiting(id);
+        let worker = &mut self.workers[place];
+        worker.idle += u32::from(after != Phase::Running);
+        worker.idle -= u32::from(before != Phase::Running);
+        worker.patience = limit;
+        self.rearm_waiting(place);
     }
 
     /// How long a live attempt may take over its next block.
@@ -144,8 +147,10 @@ impl Sched {
         let attempt = self.attempts.get(&number)?;
         let job = self.jobs.get(&attempt.image.job)?;
         let work = job.work.get(&job.place(attempt.image.image)?)?;
-        let failures = work.tiles[attempt.tile as usize].failures;
-        Some(job.block_limit(&self.config, failures))
+        let failures = work.tiles.get(attempt.tile)?.trouble.failures;
+        let cost = attempt.cost / u64::from(attempt.wanted().max(1));
+        let speed = self.workers[attempt.worker].pace.speed();
+        Some(job.block_limit(&self.config, (cost, speed), failures))
     }
 
     pub(crate) fn given_back(&mut self, id: WorkerId, attempts: &[AttemptId]) {
@@ -158,122 +163,171 @@ impl Sched {
     }
 
     pub(crate) fn link_closed(&mut self, id: WorkerId, link: LinkId) {
-        let Some(worker) = self.workers.get_mut(&id) else {
+        let Some(place) = self.workers.place(id) else {
             return;
         };
+        let worker = &mut self.workers[place];
         if worker.newest != link || worker.link == Link::Closed {
             return;
         }
         worker.link = Link::Closed;
-        self.worker_changed(id);
-        for number in self.attempts_of(id) {
+        let live = worker.live.clone();
+        self.worker_changed(place);
+        for number in live {
             let attempt = &self.attempts[&number];
             self.reconsider(attempt.image, attempt.tile);
         }
     }
 
     pub(crate) fn goodbye(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
-        for number in self.attempts_of(id) {
-            self.end_attempt(number);
+        if let Some(place) = self.workers.place(id) {
+            for number in self.workers[place].live.clone() {
+                self.end_attempt(number);
+            }
+            self.forget(place, out);
         }
-        self.forget(id, out);
     }
 
     /// Ends what is due.
     pub(crate) fn tick(&mut self, out: &mut Vec<Effect>) {
-        while let Some(timer) = self.timers.due(self.now) {
+        while let Some(timer) = self.timers.first(self.now) {
+            let alarm = match timer {
+                Timer::Stuck(number) => {
+                    let attempt = self.attempts.get_mut(&number);
+                    &mut attempt.expect("a timer ends with its attempt").stuck
+                }
+                Timer::Waiting(place) => &mut self.workers[place].waiting,
+                Timer::LetBack(place) => &mut self.workers[place].aside.alarm,
+                Timer::Lost(place) => &mut self.workers[place].lost,
+            };
+            if !self.timers.goes_off(timer, alarm, self.now) {
+                continue;
+            }
             match timer {
                 Timer::Stuck(number) => self.stuck(number, out),
-                Timer::Waiting(id) => self.idle_for_long(id, out),
-                Timer::Lost(id) => self.lost(id, out),
+                Timer::Waiting(place) => self.idle_for_long(place, out),
+                Timer::LetBack(place) => self.let_back(place),
+                Timer::Lost(place) => self.lost(place, out),
             }
         }
     }
 
     fn stuck(&mut self, number: u64, out: &mut Vec<Effect>) {
-        let Some(attempt) = self.attempts.get(&number).cloned() else {
+        let Some(attempt) = self.attempts.get(&number) else {
             return;
         };
-        self.revoke(number, RevokeReason::NoProgress, out);
         let seconds = attempt.limit.0 / 1_000_000;
-        let reason = format!("no block for {seconds} s on worker {}", attempt.worker);
-        self.charge_failure(&attempt, reason, out);
+        let worker = self.workers[attempt.worker].id;
+        let reason = format!("no block for {seconds} s on worker {worker}");
+        self.fail_and_revoke(number, reason, out);
     }
 
     /// Nothing of a worker moves, and it holds attempts that wait to be started or delivered.
-    fn idle_for_long(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
-        for number in self.attempts_of(id) {
-            let Some(attempt) = self.attempts.get(&number).cloned() else {
+    fn idle_for_long(&mut self, place: Place, out: &mut Vec<Effect>) {
+        let id = self.workers[place].id;
+        for number in self.workers[place].live.clone() {
+            let Some(attempt) = self.attempts.get(&number) else {
                 continue;
             };
             if attempt.phase != Phase::Running {
-                self.revoke(number, RevokeReason::NoProgress, out);
                 let doing = match attempt.phase {
                     Phase::Ahead => "started",
                     Phase::Running | Phase::Delivering => "delivered",
                 };
-                self.charge_failure(&attempt, format!("never {doing} by worker {id}"), out);
+                self.fail_and_revoke(number, format!("never {doing} by worker {id}"), out);
             }
         }
     }
 
-    fn lost(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
-        for number in self.attempts_of(id) {
-            if let Some(attempt) = self.end_attempt(number)
-                && attempt.phase != Phase::Ahead
-            {
-                self.charge_loss(&attempt, out);
+    fn fail_and_revoke(
+        &mut self,
+        number: u64,
+        reason: alloc::string::String,
+        out: &mut Vec<Effect>,
+    ) {
+        let worker = self.workers[self.attempts[&number].worker].id;
+        out.push(Effect::Revoke {
+            worker,
+            attempt: self.attempt_id(number),
+            reason: RevokeReason::NoProgress,
+        });
+        self.fail_attempt(number, reason, out);
+    }
+
+    fn lost(&mut self, place: Place, out: &mut Vec<Effect>) {
+        for number in self.workers[place].live.clone() {
+            match self.attempts[&number].phase {
+                Phase::Ahead => {
+                    self.end_attempt(number);
+                }
+                Phase::Running | Phase::Delivering => self.lose_attempt(number, out),
             }
         }
-        self.forget(id, out);
+        self.forget(place, out);
     }
 
     /// Removes a worker that holds nothing.
-    fn forget(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
-        let Some(mut worker) = self.workers.remove(&id) else {
+    fn forget(&mut self, place: Place, out: &mut Vec<Effect>) {
+        let worker = &mut self.workers[place];
+        worker.credit = 0;
+        self.worker_changed(place);
+        let Some(mut worker) = self.workers.remove(place) else {
             return;
         };
-        self.timers.set(Timer::Lost(id), &mut worker.lost, None);
+        self.timers.remove(Timer::Lost(place), &mut worker.lost);
         self.timers
-            .set(Timer::Waiting(id), &mut worker.waiting, None);
-        self.market
-            .place_worker((worker.revision, id), &mut worker.load, None);
-        out.push(Effect::Forget { worker: id });
+            .remove(Timer::Waiting(place), &mut worker.waiting);
+        self.timers
+            .remove(Timer::LetBack(place), &mut worker.aside.alarm);
+        for job in worker.aside.jobs() {
+            if let Some(job) = self.jobs.get_mut(&job) {
+                job.aside -= 1;
+            }
+        }
+        out.push(Effect::Forget { worker: worker.id });
     }
 
-    /// A worker gave a sign of life.
-    pub(crate) fn heard(&mut self, id: WorkerId) {
-        if let Some(worker) = self.workers.get_mut(&id) {
-            worker.heard = self.now;
-            let due = Some(self.now + self.config.liveness_limit);
-            self.timers.set(Timer::Lost(id), &mut worker.lost, due);
-        }
+    /// A worker gave a sign of life; says where it is, if it is known.
+    pub(crate) fn heard(&mut self, id: WorkerId) -> Option<Place> {
+        let place = self.workers.place(id)?;
+        let worker = &mut self.workers[place];
+        worker.heard = self.now;
+        let due = Some(self.now + self.config.liveness_limit);
+        self.timers.set(Timer::Lost(place), &mut worker.lost, due);
+        Some(place)
     }
 
     /// Something of a worker moved: where it renders nothing, what it holds may wait
     /// for its patience again. While it renders, the limit of that holds.
-    pub(crate) fn rearm_waiting(&mut self, id: WorkerId) {
-        if let Some(worker) = self.workers.get_mut(&id) {
-            let due = worker.is_idle().then(|| self.now + worker.patience);
-            self.timers
-                .set(Timer::Waiting(id), &mut worker.waiting, due);
-        }
+    pub(crate) fn rearm_waiting(&mut self, place: Place) {
+        let worker = &mut self.workers[place];
+        let due = worker.is_idle().then(|| self.now + worker.patience);
+        self.timers
+            .set(Timer::Waiting(place), &mut worker.waiting, due);
     }
 
-    /// Sees that a worker stands where it belongs in the market.
-    pub(crate) fn worker_changed(&mut self, id: WorkerId) {
-        if let Some(worker) = self.workers.get_mut(&id) {
-            let load = worker.wants();
-            self.market
-                .place_worker((worker.revision, id), &mut worker.load, load);
+    /// Sees that a worker stands where it belongs in the market, and counts for what it is worth.
+    pub(crate) fn worker_changed(&mut self, place: Place) {
+        let worker = &mut self.workers[place];
+        let counts = worker.counts();
+        if counts != worker.counted {
+            let (before, after) = (worker.counted, counts);
+            worker.counted = counts;
+            let of_kinds = |counted: Option<(_, u64)>| counted.map(|(kinds, _)| kinds);
+            if of_kinds(before) != of_kinds(after) {
+                if let Some((kinds, _)) = before {
+                    self.kinds.count_able(kinds, Comes::Out);
+                    // A tile that failed on all that are left may now go to one of them.
+                    self.market.touch(kinds);
+                }
+                if let Some((kinds, _)) = after {
+                    self.kinds.count_able(kinds, Comes::In);
+                }
+            }
+            self.capacity -= before.map_or(0, |(_, capacity)| capacity);
+            self.capacity += after.map_or(0, |(_, capacity)| capacity);
         }
-    }
-
-    fn attempts_of(&self, id: WorkerId) -> Vec<u64> {
-        self.workers
-            .get(&id)
-            .into_iter()
-            .flat_map(|worker| worker.live.iter().copied())
-            .collect()
+        let seat = worker.wants(place);
+        self.market.place_worker(&mut worker.seat, seat);
     }
 }

@@ -1,29 +1,79 @@
 //! Which workers want tiles, and which jobs have some.
 //!
-//! Outside [`crate::Sched::handle`] no revision has both: whatever can be leased is.
+//! Outside [`crate::Sched::handle`] no worker wants a tile that it may have: whatever can be leased is.
 
-use alloc::collections::BTreeSet;
+use alloc::collections::{BTreeMap, BTreeSet};
+use alloc::vec::Vec;
+use core::cmp::Reverse;
 
-use model::{JobId, Revision, WorkerId};
+use model::JobId;
 
-/// Workers that want tiles and jobs that have some, per renderer revision.
+use crate::needs::{Kind, KindSet};
+use crate::roster::Place;
+
+/// Workers that want tiles and jobs that have some, by the kind of job.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Market {
-    /// The least loaded first.
-    workers: BTreeSet<(Revision, Load, WorkerId)>,
-    /// The oldest first.
-    jobs: BTreeSet<(Revision, JobId)>,
-    /// Revisions where somebody came in since the last time nothing was left to match.
-    touched: BTreeSet<Revision>,
+    /// Workers that serve the same kinds together, the least loaded first.
+    wanting: BTreeMap<KindSet, BTreeSet<Seat>>,
+    /// Jobs with tiles that wait for a worker, by kind, in the order in which they are served.
+    open: Vec<BTreeSet<Rank>>,
+    /// Jobs of which every tile is leased and not every tile is done, in the same way.
+    ending: Vec<BTreeSet<Rank>>,
+    /// Kinds where somebody came in since the last time nothing was left to match.
+    touched: KindSet,
 }
 
-/// Tiles held per thread, times 1,024.
+/// Where a worker stands among those that want tiles.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
-pub(crate) struct Load(u64);
+pub(crate) struct Seat {
+    /// Tiles held per thread, times 1,024.
+    load: u64,
+    /// Of those that are loaded alike, the fastest first.
+    speed: Reverse<u32>,
+    pub(crate) worker: Place,
+}
 
-impl Load {
-    pub(crate) fn new(held: usize, threads: u32) -> Self {
-        Self(held as u64 * 1_024 / u64::from(threads.max(1)))
+/// Where a job stands among those of its kind.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) struct Rank {
+    priority: Reverse<i32>,
+    /// What it would hold of the farm with one more tile, per share, times 2²⁰.
+    load: u64,
+    pub(crate) job: JobId,
+}
+
+/// What a job has for workers.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Stage {
+    /// Tiles that wait for one.
+    Open,
+    /// Tiles that are leased, and could be leased a second time or called back.
+    Ending,
+}
+
+impl Seat {
+    pub(crate) fn new(held: usize, threads: u32, speed: u32, worker: Place) -> Self {
+        Self {
+            load: held as u64 * 1_024 / u64::from(threads.max(1)),
+            speed: Reverse(speed),
+            worker,
+        }
+    }
+
+    /// Whether one of its threads has nothing to do.
+    pub(crate) fn has_free_thread(self) -> bool {
+        self.load < 1_024
+    }
+}
+
+impl Rank {
+    pub(crate) fn new(priority: i32, held: u32, share: u32, job: JobId) -> Self {
+        Self {
+            priority: Reverse(priority),
+            load: (u64::from(held) + 1) * (1 << 20) / u64::from(share.max(1)),
+            job,
+        }
     }
 }
 
@@ -31,70 +81,104 @@ impl Market {
     /// Puts a worker where it now belongs; `slot` is where it stood.
     pub(crate) fn place_worker(
         &mut self,
-        (revision, worker): (Revision, WorkerId),
-        slot: &mut Option<Load>,
-        load: Option<Load>,
+        slot: &mut Option<(KindSet, Seat)>,
+        seat: Option<(KindSet, Seat)>,
     ) {
-        if *slot == load {
+        if *slot == seat {
             return;
         }
-        if let Some(old) = *slot {
-            self.workers.remove(&(revision, old, worker));
-        }
-        if let Some(new) = load {
-            self.workers.insert((revision, new, worker));
-            self.touched.insert(revision);
-        }
-        *slot = load;
-    }
-
-    /// Puts a job in, or takes it out.
-    pub(crate) fn place_job(&mut self, revision: Revision, job: JobId, has_tiles: bool) {
-        if !has_tiles {
-            self.jobs.remove(&(revision, job));
-        } else if self.jobs.insert((revision, job)) {
-            self.touched.insert(revision);
-        }
-    }
-
-    /// A worker and the job that its next tile comes from.
-    pub(crate) fn next_match(&mut self) -> Option<(WorkerId, JobId)> {
-        while let Some(&revision) = self.touched.first() {
-            if let Some(pair) = self.worker(revision).zip(self.job(revision)) {
-                return Some(pair);
+        if let Some((kinds, old)) = *slot
+            && let Some(seats) = self.wanting.get_mut(&kinds)
+        {
+            seats.remove(&old);
+            if seats.is_empty() {
+                self.wanting.remove(&kinds);
             }
-            self.touched.remove(&revision);
         }
-        None
+        if let Some((kinds, new)) = seat {
+            self.wanting.entry(kinds).or_default().insert(new);
+            self.touched.add(kinds);
+        }
+        *slot = seat;
     }
 
-    /// Whether a worker of this revision wants a tile and a job has one.
-    pub(crate) fn is_open(&self, revision: Revision) -> bool {
-        self.worker(revision).is_some() && self.job(revision).is_some()
+    /// Puts a job where it now belongs; `slot` is where it stood.
+    pub(crate) fn place_job(
+        &mut self,
+        kind: Kind,
+        slot: &mut Option<(Stage, Rank)>,
+        place: Option<(Stage, Rank)>,
+    ) {
+        if *slot == place {
+            return;
+        }
+        if let Some((stage, rank)) = *slot {
+            self.ranks(stage, kind).remove(&rank);
+        }
+        if let Some((stage, rank)) = place {
+            self.ranks(stage, kind).insert(rank);
+        }
+        *slot = place;
     }
 
-    /// Whether a job is in.
-    pub(crate) fn has_job(&self, revision: Revision, job: JobId) -> bool {
-        self.jobs.contains(&(revision, job))
+    /// Something of these kinds may be leased that was not before.
+    pub(crate) fn touch(&mut self, kinds: KindSet) {
+        self.touched.add(kinds);
     }
 
-    fn worker(&self, revision: Revision) -> Option<WorkerId> {
-        let least = WorkerId {
-            id: 0,
-            incarnation: 0,
+    /// A job of a kind has tiles that may not have been there before, or may suit somebody else now.
+    pub(crate) fn touch_kind(&mut self, kind: Kind) {
+        self.touched.insert(kind);
+    }
+
+    /// A kind that may have something to match.
+    pub(crate) fn touched(&self) -> Option<Kind> {
+        self.touched.first()
+    }
+
+    /// Nothing of a kind is left to match.
+    pub(crate) fn settled(&mut self, kind: Kind) {
+        self.touched.remove(kind);
+    }
+
+    /// Workers that want tiles and serve a kind, each group in order.
+    pub(crate) fn wanting(&self, kind: Kind) -> impl Iterator<Item = (KindSet, &BTreeSet<Seat>)> {
+        let serves = move |kinds: &KindSet| kinds.contains(kind);
+        let groups = self.wanting.iter().filter(move |(kinds, _)| serves(kinds));
+        groups.map(|(&kinds, seats)| (kinds, seats))
+    }
+
+    /// All workers that want tiles, in groups.
+    pub(crate) fn groups(&self) -> impl Iterator<Item = (KindSet, &BTreeSet<Seat>)> {
+        self.wanting.iter().map(|(&kinds, seats)| (kinds, seats))
+    }
+
+    /// The jobs of a kind in a stage, in order.
+    pub(crate) fn jobs(&self, stage: Stage, kind: Kind) -> impl Iterator<Item = Rank> {
+        let ranks = match stage {
+            Stage::Open => &self.open,
+            Stage::Ending => &self.ending,
         };
-        self.workers
-            .range((revision, Load(0), least)..)
-            .next()
-            .filter(|(of, ..)| *of == revision)
-            .map(|&(_, _, worker)| worker)
+        ranks.get(kind.index()).into_iter().flatten().copied()
     }
 
-    fn job(&self, revision: Revision) -> Option<JobId> {
-        self.jobs
-            .range((revision, JobId(0))..)
-            .next()
-            .filter(|(of, _)| *of == revision)
-            .map(|&(_, job)| job)
+    /// Whether some job is in a stage.
+    pub(crate) fn has(&self, stage: Stage) -> bool {
+        let ranks = match stage {
+            Stage::Open => &self.open,
+            Stage::Ending => &self.ending,
+        };
+        ranks.iter().any(|ranks| !ranks.is_empty())
+    }
+
+    fn ranks(&mut self, stage: Stage, kind: Kind) -> &mut BTreeSet<Rank> {
+        let ranks = match stage {
+            Stage::Open => &mut self.open,
+            Stage::Ending => &mut self.ending,
+        };
+        if ranks.len() <= kind.index() {
+            ranks.resize(kind.index() + 1, BTreeSet::new());
+        }
+        &mut ranks[kind.index()]
     }
 }

@@ -62,6 +62,19 @@ impl PixelsDone {
         })
     }
 
+    /// How many pixels of a block inside the window are not done.
+    pub(crate) fn missing(&self, block: Rect) -> u64 {
+        let square = self.square(block);
+        if self.complete[square / 64] >> (square % 64) & 1 == 1 {
+            return 0;
+        }
+        let bits = column_bits(block);
+        let done = self.begun.get(&square).map_or(0, |mask| {
+            rows(block).map(|row| (mask[row] & bits).count_ones()).sum()
+        });
+        block.area() - u64::from(done)
+    }
+
     /// Adds a block inside the window; says how many of its pixels are new.
     pub(crate) fn add(&mut self, block: Rect) -> u64 {
         let square = self.square(block);
@@ -154,6 +167,8 @@ mod tests {
                 for block in tile.intersection(window).into_iter().flat_map(Rect::blocks) {
                     let covered = pixels_of(block).all(|pixel| model.contains(&pixel));
                     prop_assert_eq!(done.covers(block), covered);
+                    let missing = pixels_of(block).filter(|pixel| !model.contains(pixel)).count();
+                    prop_assert_eq!(done.missing(block), missing as u64);
                     let before = model.len();
                     model.extend(pixels_of(block));
                     prop_assert_eq!(done.add(block), (model.len() - before) as u64);

@@ -2,7 +2,7 @@
 
 use core::fmt;
 
-use model::Revision;
+use model::{ImageNumber, JobId, Revision};
 
 /// What to do with a block that a worker sent.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -60,6 +60,13 @@ pub enum WorkerRefusal {
     },
     /// It says that it has no render thread.
     NoThreads,
+    /// It has too many labels, or one that is too long.
+    TooManyLabels {
+        /// Most labels there may be.
+        labels_max: u32,
+        /// Most bytes of a label.
+        bytes_max: usize,
+    },
 }
 
 impl WorkerRefusal {
@@ -82,6 +89,13 @@ impl fmt::Display for WorkerRefusal {
                 "the farm has its {max} workers already; try again when one has left"
             ),
             Self::NoThreads => f.write_str("a worker needs at least one render thread"),
+            Self::TooManyLabels {
+                labels_max,
+                bytes_max,
+            } => write!(
+                f,
+                "a worker can have at most {labels_max} labels of at most {bytes_max} bytes each"
+            ),
         }
     }
 }
@@ -135,6 +149,33 @@ pub enum SubmitRefusal {
         /// Most there may be.
         max: u64,
     },
+    /// A job that this one is to begin after is not known.
+    UnknownJob {
+        /// Which.
+        job: JobId,
+    },
+    /// The job is to begin after too many others.
+    TooManyAfter {
+        /// Most there may be.
+        max: u32,
+    },
+    /// The share is 0 or too large.
+    ShareOutside {
+        /// The largest.
+        max: u32,
+    },
+    /// The job asks for too many labels, or for one that is too long.
+    TooManyLabels {
+        /// Most labels there may be.
+        labels_max: u32,
+        /// Most bytes of a label.
+        bytes_max: usize,
+    },
+    /// Jobs ask for too many different things of workers.
+    TooManyKinds {
+        /// How many there may be at a time.
+        max: u32,
+    },
     /// The name is too long.
     NameTooLong {
         /// Most bytes there may be.
@@ -152,7 +193,10 @@ pub enum SubmitRefusal {
 impl SubmitRefusal {
     /// Whether the same submission may be taken later.
     pub fn is_retryable(self) -> bool {
-        matches!(self, Self::TooManyJobs { .. } | Self::TooManyImages { .. })
+        matches!(
+            self,
+            Self::TooManyJobs { .. } | Self::TooManyImages { .. } | Self::TooManyKinds { .. }
+        )
     }
 }
 
@@ -188,6 +232,25 @@ impl fmt::Display for SubmitRefusal {
                 f,
                 "an image would be cut into {tiles} tiles, at most {max} are taken; ask for larger tiles"
             ),
+            Self::UnknownJob { job } => {
+                write!(f, "there is no job {job} that this one could begin after")
+            }
+            Self::TooManyAfter { max } => {
+                write!(f, "a job can begin after at most {max} others")
+            }
+            Self::ShareOutside { max } => write!(f, "a job's share is a number from 1 to {max}"),
+            Self::TooManyLabels {
+                labels_max,
+                bytes_max,
+            } => write!(
+                f,
+                "a job can ask for at most {labels_max} labels of at most {bytes_max} bytes each"
+            ),
+            Self::TooManyKinds { max } => write!(
+                f,
+                "jobs ask for {max} different things of workers, which is the most there may be; \
+                 ask for what another job asks for, or try again when one is forgotten"
+            ),
             Self::NameTooLong { bytes_max } => {
                 write!(f, "the job's name is longer than {bytes_max} bytes")
             }
@@ -201,3 +264,69 @@ impl fmt::Display for SubmitRefusal {
 }
 
 impl core::error::Error for SubmitRefusal {}
+
+/// Why a command is not followed.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum CommandRefusal {
+    /// There is no such job.
+    UnknownJob,
+    /// The job is over.
+    JobOver,
+    /// The job was cancelled: its scene and scratch files are gone.
+    JobCancelled,
+    /// No image of the job has failed.
+    NothingFailed,
+    /// The job has no such image.
+    UnknownImage {
+        /// Which.
+        image: ImageNumber,
+    },
+    /// The image is still to be finished for the first time.
+    ImageUnfinished {
+        /// Which.
+        image: ImageNumber,
+    },
+    /// Another job waits for this one to be finished.
+    WaitedFor {
+        /// Which.
+        by: JobId,
+    },
+    /// The share is 0 or too large.
+    ShareOutside {
+        /// The largest.
+        max: u32,
+    },
+    /// As many jobs as there may be are waiting.
+    TooManyJobs {
+        /// How many that is.
+        max: u32,
+    },
+}
+
+impl fmt::Display for CommandRefusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::UnknownJob => f.write_str("there is no such job"),
+            Self::JobOver => f.write_str("the job is over"),
+            Self::JobCancelled => f.write_str("the job was cancelled: submit it again"),
+            Self::NothingFailed => f.write_str("no frame of the job has failed"),
+            Self::UnknownImage { image } => write!(f, "the job has no frame {image}"),
+            Self::ImageUnfinished { image } => {
+                write!(
+                    f,
+                    "frame {image} is not finished yet, so it is rendered anyway"
+                )
+            }
+            Self::WaitedFor { by } => {
+                write!(f, "job {by} waits for this one: cancel it first")
+            }
+            Self::ShareOutside { max } => write!(f, "a job's share is a number from 1 to {max}"),
+            Self::TooManyJobs { max } => write!(
+                f,
+                "{max} jobs are waiting, which is the most there may be; try again when one is over"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for CommandRefusal {}

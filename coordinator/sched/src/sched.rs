@@ -8,8 +8,9 @@ use model::{AttemptId, ImageRef, JobId, Rect, SubmissionId, Timestamp, WorkerId}
 use crate::attempt::{Attempt, is_block_of};
 use crate::job::Job;
 use crate::market::Market;
+use crate::needs::Kinds;
+use crate::roster::Roster;
 use crate::timers::Timers;
-use crate::worker::Worker;
 use crate::{
     BlockRef, BlockRefusal, Config, Effect, Event, ImageFailure, ImageView, JobView, Verdict,
     WorkerView,
@@ -31,7 +32,12 @@ pub struct Sched {
     pub(crate) over: VecDeque<JobId>,
     /// Images of all jobs that are remembered.
     pub(crate) images: u32,
-    pub(crate) workers: BTreeMap<WorkerId, Worker>,
+    /// Jobs that others wait for, and which.
+    pub(crate) waited_for: BTreeMap<JobId, BTreeSet<JobId>>,
+    pub(crate) kinds: Kinds,
+    pub(crate) workers: Roster,
+    /// What all threads of workers that take tiles get done in a microsecond, times 1,024.
+    pub(crate) capacity: u64,
     /// Live attempts by number.
     pub(crate) attempts: BTreeMap<u64, Attempt>,
     pub(crate) attempts_made: u64,
@@ -52,7 +58,10 @@ impl Sched {
             jobs_made: 0,
             over: VecDeque::new(),
             images: 0,
-            workers: BTreeMap::new(),
+            waited_for: BTreeMap::new(),
+            kinds: Kinds::default(),
+            workers: Roster::default(),
+            capacity: 0,
             attempts: BTreeMap::new(),
             attempts_made: 0,
             timers: Timers::default(),
@@ -72,7 +81,8 @@ impl Sched {
                 worker,
                 block,
                 elapsed,
-            } => self.block_stored(worker, block, elapsed, out),
+                pixels,
+            } => self.block_stored(worker, block, (elapsed, pixels), out),
             Event::TileFailed {
                 worker,
                 attempt,
@@ -80,20 +90,22 @@ impl Sched {
             } => self.tile_failed(worker, attempt, reason, out),
             Event::ImageEncoded { image, film } => self.image_encoded(image, film, out),
             Event::ImageFailed { image, reason } => self.image_failed(image, reason, out),
-            Event::Cancel { job } => self.cancel(job, out),
+            Event::Command { job, command } => self.command(job, command, out),
             Event::WorkerJoined {
                 worker,
                 link,
-                revision,
-                threads,
+                offer,
                 held,
-            } => self.worker_joined(worker, (link, revision, threads), &held, out),
+            } => self.worker_joined(worker, (link, offer), &held, out),
             Event::Credit { worker, credit } => self.credit(worker, credit),
             Event::Heartbeat { worker, running } => self.heartbeat(worker, &running, out),
             Event::GivenBack { worker, attempts } => self.given_back(worker, &attempts),
             Event::LinkClosed { worker, link } => self.link_closed(worker, link),
             Event::Goodbye { worker } => self.goodbye(worker, out),
             Event::Tick => self.tick(out),
+        }
+        for job in self.changed.iter().copied().collect::<Vec<_>>() {
+            self.settle_job(job);
         }
         self.lease_all(out);
         while let Some(job) = self.changed.pop_first() {
@@ -114,7 +126,7 @@ impl Sched {
         let Some(attempt) = self.live(block.attempt) else {
             return refuse(BlockRefusal::AttemptDead);
         };
-        if attempt.worker != worker {
+        if self.workers[attempt.worker].id != worker {
             return refuse(BlockRefusal::NotYours);
         }
         if attempt.image != block.image {
@@ -171,18 +183,19 @@ impl Sched {
 
     /// A worker.
     pub fn worker(&self, worker: WorkerId) -> Option<WorkerView> {
-        Some(self.workers.get(&worker)?.view(worker))
+        Some(self.workers.by_id(worker)?.view())
     }
 
     /// All workers that are known, by id.
     pub fn workers(&self) -> impl Iterator<Item = WorkerView> {
-        self.workers.iter().map(|(&id, worker)| worker.view(id))
+        self.workers.iter().map(|(_, worker)| worker.view())
     }
 
     /// Whose a live attempt is, and its image and tile; `None` for one that is dead.
     pub fn attempt(&self, attempt: AttemptId) -> Option<(WorkerId, ImageRef, Rect)> {
         let attempt = self.live(attempt)?;
-        Some((attempt.worker, attempt.image, attempt.rect))
+        let worker = self.workers[attempt.worker].id;
+        Some((worker, attempt.image, attempt.rect))
     }
 
     /// A live attempt; one of another epoch never is.
@@ -195,7 +208,7 @@ impl Sched {
     /// The number of a live attempt, if it is this worker's.
     pub(crate) fn owned(&self, worker: WorkerId, attempt: AttemptId) -> Option<u64> {
         let live = self.live(attempt)?;
-        (live.worker == worker).then_some(attempt.number)
+        (self.workers[live.worker].id == worker).then_some(attempt.number)
     }
 
     pub(crate) fn attempt_id(&self, number: u64) -> AttemptId {

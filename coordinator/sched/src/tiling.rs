@@ -9,6 +9,7 @@
 //! the smallest square that is large enough, and a last column and row of smaller ones stay over.
 
 use model::Rect;
+use model::rect::GRID_SQUARE;
 
 /// How many times the wanted pixels a tile that divides exactly may have, and how many times as
 /// long as wide it may be, before smaller tiles at the edge are the lesser evil.
@@ -77,21 +78,37 @@ fn divisors(number: u32) -> impl Iterator<Item = u32> {
     (1..=number).filter(move |divisor| number.is_multiple_of(*divisor))
 }
 
-/// A window cut into equal tiles, row by row from its top left, the last column and row perhaps smaller.
+/// A window cut into equal cells, row by row from its top left; those at its edges may be smaller.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) struct TileGrid {
     window: Rect,
+    /// Where the lines start that the window is cut along; not beyond the window's own corner.
+    x0: u32,
+    y0: u32,
     width: u32,
     height: u32,
 }
 
 impl TileGrid {
-    /// A window that is not empty, cut into tiles of `size`: columns and rows, at least 1 each.
+    /// A window that is not empty, cut into cells of `size`: columns and rows, at least 1 each.
     pub(crate) fn new(window: Rect, size: (u32, u32)) -> Self {
         Self {
             window,
+            x0: window.x0,
+            y0: window.y0,
             width: size.0.clamp(1, window.width().max(1)),
             height: size.1.clamp(1, window.height().max(1)),
+        }
+    }
+
+    /// A window that is not empty, cut along the image's fixed grid.
+    pub(crate) fn squares(window: Rect) -> Self {
+        Self {
+            window,
+            x0: window.x0 / GRID_SQUARE * GRID_SQUARE,
+            y0: window.y0 / GRID_SQUARE * GRID_SQUARE,
+            width: GRID_SQUARE,
+            height: GRID_SQUARE,
         }
     }
 
@@ -100,41 +117,53 @@ impl TileGrid {
         self.window
     }
 
-    /// Columns and rows of a whole tile.
+    /// Columns and rows of pixels in a whole cell.
     pub(crate) fn size(self) -> (u32, u32) {
         (self.width, self.height)
     }
 
-    /// Number of tiles.
+    /// Number of cells.
     pub(crate) fn count(self) -> u64 {
-        u64::from(self.columns()) * u64::from(self.window.height().div_ceil(self.height))
+        u64::from(self.columns()) * u64::from(self.rows())
     }
 
-    /// The tile at `index`, counting row by row; `index` is below [`Self::count`].
+    /// Columns of cells.
+    pub(crate) fn columns(self) -> u32 {
+        (self.window.x1 - self.x0).div_ceil(self.width)
+    }
+
+    /// Rows of cells.
+    pub(crate) fn rows(self) -> u32 {
+        (self.window.y1 - self.y0).div_ceil(self.height)
+    }
+
+    /// The cell at `index`, counting row by row; `index` is below [`Self::count`].
     pub(crate) fn tile(self, index: u32) -> Rect {
-        let x0 = self.window.x0 + index % self.columns() * self.width;
-        let y0 = self.window.y0 + index / self.columns() * self.height;
+        let (column, row) = (index % self.columns(), index / self.columns());
+        self.span((column, row), (column + 1, row + 1))
+    }
+
+    /// The pixels of the cells from one column and row up to, and without, another.
+    pub(crate) fn span(self, from: (u32, u32), to: (u32, u32)) -> Rect {
+        let x = |column: u32| self.x0.saturating_add(column * self.width);
+        let y = |row: u32| self.y0.saturating_add(row * self.height);
         Rect {
-            x0,
-            y0,
-            x1: x0.saturating_add(self.width).min(self.window.x1),
-            y1: y0.saturating_add(self.height).min(self.window.y1),
+            x0: x(from.0).max(self.window.x0),
+            y0: y(from.1).max(self.window.y0),
+            x1: x(to.0).min(self.window.x1),
+            y1: y(to.1).min(self.window.y1),
         }
     }
 
-    /// The index of the tile that holds all of `rect`.
+    /// The index of the cell that holds all of `rect`.
     pub(crate) fn index_of(self, rect: Rect) -> Option<u32> {
         if rect.is_empty() || !self.window.contains(rect) {
             return None;
         }
-        let column = (rect.x0 - self.window.x0) / self.width;
-        let row = (rect.y0 - self.window.y0) / self.height;
+        let column = (rect.x0 - self.x0) / self.width;
+        let row = (rect.y0 - self.y0) / self.height;
         let index = row * self.columns() + column;
         self.tile(index).contains(rect).then_some(index)
-    }
-
-    fn columns(self) -> u32 {
-        self.window.width().div_ceil(self.width)
     }
 }
 
@@ -202,6 +231,35 @@ mod tests {
             let count = TileGrid::new(window, few.tile_size(window)).count();
             assert!((1..=7).contains(&count), "{width}x{height}: {count}");
         }
+    }
+
+    #[test]
+    fn squares_follow_the_images_grid() {
+        let window = Rect {
+            x0: 40,
+            y0: 70,
+            x1: 100,
+            y1: 97,
+        };
+        let grid = TileGrid::squares(window);
+        assert_eq!((grid.columns(), grid.rows()), (3, 2));
+        let first = Rect {
+            x0: 40,
+            y0: 70,
+            x1: 64,
+            y1: 96,
+        };
+        let last = Rect {
+            x0: 96,
+            y0: 96,
+            x1: 100,
+            y1: 97,
+        };
+        assert_eq!((grid.tile(0), grid.tile(5)), (first, last));
+        assert_eq!(grid.span((0, 0), (3, 2)), window);
+        let blocks: Vec<Rect> = window.blocks().collect();
+        let tiles: Vec<Rect> = (0..6).map(|index| grid.tile(index)).collect();
+        assert_eq!(tiles, blocks);
     }
 
     proptest! {

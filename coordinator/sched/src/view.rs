@@ -1,5 +1,6 @@
 //! What can be asked: snapshots, cheap and without effect.
 
+use alloc::collections::BTreeSet;
 use alloc::string::String;
 
 use model::{
@@ -25,24 +26,41 @@ pub struct JobView<'a> {
     pub frames: FrameRange,
     /// The pixels of each image that are rendered.
     pub window: Rect,
-    /// Columns and rows of its tiles; the last column and row may be smaller.
-    pub tile_size: (u32, u32),
-    /// Tiles of each image.
-    pub tiles_per_image: u32,
+    /// Columns and rows of its tiles, of which the last column and row may be smaller, and how many
+    /// each image has; absent where tiles are cut by time.
+    pub tiles: Option<((u32, u32), u32)>,
+    /// Its priority.
+    pub priority: i32,
+    /// Its share of the farm among the jobs of its priority.
+    pub share: u32,
+    /// Whether it is paused.
+    pub paused: Paused,
+    /// Its region of interest.
+    pub focus: Option<Rect>,
+    /// Jobs that must be finished before it begins, and are not.
+    pub after: &'a BTreeSet<JobId>,
     /// Whether it is over, and how it ended.
     pub state: JobState,
     /// How many images are in which state.
     pub images: ImageCounts,
-    /// Pixels that are durable; those of images that failed later included.
+    /// Pixels that are durable, or in frames that are in their place.
     pub pixels_done: u64,
     /// Pixels of all its images.
     pub pixels: u64,
-    /// Blocks that are durable.
+    /// Blocks that were made durable.
     pub blocks_done: u64,
     /// Blocks that arrived although another attempt's had made all their pixels durable.
     pub blocks_again: u64,
     /// Pixels that arrived although another attempt's were durable.
     pub pixels_again: u64,
+    /// Blocks that arrived a second time because their tile was leased twice on purpose, near the end.
+    pub blocks_twice: u64,
+    /// Blocks of which two renderings differed.
+    pub incidents: u64,
+    /// Tiles that were leased a second time on purpose.
+    pub seconds: u64,
+    /// Leases that were called back before they were started.
+    pub called_back: u64,
     /// Time that threads took over the blocks that are durable, all together.
     pub render_time: Span,
     /// Tiles leased at this moment, second attempts included.
@@ -66,6 +84,15 @@ pub enum JobState {
     Running,
     /// It is over.
     Over(JobOutcome),
+}
+
+/// Whether a job is paused.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Paused {
+    /// It goes on.
+    No,
+    /// Nothing of it is leased.
+    Yes,
 }
 
 /// How many of a job's images are in which state.
@@ -144,6 +171,10 @@ pub struct WorkerView {
     pub attempts: u32,
     /// How many of those it is known to be rendering.
     pub running: u32,
+    /// How fast one of its threads is, of which 1,024 is the usual.
+    pub speed: u32,
+    /// Until when it is set aside for the whole farm, if it is.
+    pub aside: Option<Timestamp>,
     /// When it was last heard of.
     pub heard: Timestamp,
     /// When it joined first.

@@ -1,131 +1,379 @@
-//! An image in flight: its tiles, and which of them wait for a worker.
+//! An image in flight: which of its pixels are durable, its tiles, and the pieces that wait to become some.
+//!
+//! A *piece* is a region of cells that nobody renders. At first the whole image is one; a tile
+//! is cut from a piece when it is leased, as large as the worker that gets it should have it,
+//! and becomes a piece again when its last attempt ends before it is done.
 
-use alloc::collections::BTreeSet;
+use alloc::collections::{BTreeMap, BTreeSet, VecDeque};
+use alloc::sync::Arc;
+use alloc::vec;
 use alloc::vec::Vec;
+use core::cmp::Reverse;
 
-use model::Rect;
+use model::{Rect, WorkerId};
 
+use crate::costs::CostMap;
 use crate::pixels::PixelsDone;
+use crate::region::Region;
+use crate::tile::{Tile, Tiles, Trouble};
 use crate::tiling::TileGrid;
 
-/// Most live attempts of one tile.
-pub(crate) const LIVE_MAX: usize = 2;
+/// The mark of a cell that is part of no tile.
+const NO_TILE: u32 = u32::MAX;
+
+/// Pieces that failed on some worker and are looked at for one that suits another, at most.
+const LOOKED_AT_MAX: usize = 16;
 
 /// What is kept of an image while its tiles are rendered.
 #[derive(Clone, Debug)]
 pub(crate) struct Work {
     pub(crate) pixels: PixelsDone,
-    pub(crate) tiles: Vec<Tile>,
+    pub(crate) tiles: Tiles,
+    /// No more of it is leased: it is about to fail.
+    pub(crate) given_up: bool,
     grid: TileGrid,
-    /// Tiles from here on have never been leased and wait.
-    fresh: u32,
-    /// Tiles before `fresh` that wait again.
-    reopened: BTreeSet<u32>,
-    /// Live attempts at any of its tiles.
-    pub(crate) live: BTreeSet<u64>,
+    map: Option<Arc<CostMap>>,
+    focus: Option<Rect>,
+    /// The tile of each cell.
+    cells: Vec<u32>,
+    /// Pieces, those that come first first.
+    pieces: BTreeMap<Order, Piece>,
+    /// Pieces at which some worker failed, in the order in which they did.
+    troubled: VecDeque<Piece>,
+    /// Tiles that are open to a second attempt, because the worker of the first is away.
+    shared: BTreeSet<u32>,
+    /// Of all pieces.
+    open: Amount,
 }
 
-/// What is kept of a tile.
+/// Which piece comes first: one in the region of interest, then the one with the
+/// dearest cell, so that what takes longest is not begun last, then from the top left.
+type Order = (Reverse<bool>, Reverse<u32>, u32);
+
 #[derive(Clone, Debug)]
-pub(crate) struct Tile {
-    /// Pixels that are not durable.
-    pub(crate) missing: u64,
-    /// Attempts that failed or got stuck.
-    pub(crate) failures: u32,
-    /// Attempts that ran on a worker that was then lost, since a pixel of it was last made durable.
-    pub(crate) losses: u32,
-    pub(crate) live: [Option<u64>; LIVE_MAX],
+struct Piece {
+    region: Region,
+    trouble: Trouble,
+}
+
+/// An amount of work, in both of its measures.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Amount {
+    pub(crate) pixels: u64,
+    /// By the image's cost map; 0 where it has none.
+    pub(crate) cost: u64,
+}
+
+/// Who asks for a tile, and how large it may be.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ask {
+    pub(crate) worker: WorkerId,
+    /// Workers that there are for this job.
+    pub(crate) able: u32,
+    /// A tile of more than one cell is not larger than this; absent, none has more than one.
+    pub(crate) most: Option<Amount>,
+    /// A tile is not larger than this, in the time that the worker has left.
+    pub(crate) fits: Option<Amount>,
 }
 
 impl Work {
-    pub(crate) fn new(grid: TileGrid) -> Self {
-        let count = u32::try_from(grid.count()).expect("a submission's tiles are limited");
-        Self {
+    pub(crate) fn new(grid: TileGrid, map: Option<Arc<CostMap>>, focus: Option<Rect>) -> Self {
+        let count = usize::try_from(grid.count()).expect("a submission's tiles are limited");
+        let mut work = Self {
             pixels: PixelsDone::none(grid.window()),
-            tiles: (0..count)
-                .map(|index| Tile {
-                    missing: grid.tile(index).area(),
-                    failures: 0,
-                    losses: 0,
-                    live: [None; LIVE_MAX],
-                })
-                .collect(),
+            tiles: Tiles::default(),
+            given_up: false,
             grid,
-            fresh: 0,
-            reopened: BTreeSet::new(),
-            live: BTreeSet::new(),
-        }
+            map,
+            focus,
+            cells: vec![NO_TILE; count],
+            pieces: BTreeMap::new(),
+            troubled: VecDeque::new(),
+            shared: BTreeSet::new(),
+            open: Amount::default(),
+        };
+        work.put(Piece {
+            region: Region::whole(grid),
+            trouble: Trouble::default(),
+        });
+        work
     }
 
-    pub(crate) fn rect(&self, tile: u32) -> Rect {
-        self.grid.tile(tile)
-    }
-
-    pub(crate) fn tile_of(&self, block: Rect) -> Option<u32> {
-        self.grid.index_of(block)
-    }
-
-    /// Whether some tile waits for a worker.
+    /// Whether any tile or piece waits for a worker.
     pub(crate) fn has_open(&self) -> bool {
-        !self.reopened.is_empty() || (self.fresh as usize) < self.tiles.len()
+        let waits = !self.shared.is_empty() || !self.pieces.is_empty() || !self.troubled.is_empty();
+        waits && !self.given_up
     }
 
-    /// The first tile that waits for a worker; it waits no more.
-    pub(crate) fn take_open(&mut self) -> Option<u32> {
-        self.reopened.pop_first().or_else(|| {
-            let tile = self.fresh;
-            ((tile as usize) < self.tiles.len()).then(|| {
-                self.fresh += 1;
-                tile
-            })
+    /// Whether one waits in the region of interest.
+    pub(crate) fn has_focused(&self) -> bool {
+        let first = self.pieces.first_key_value();
+        self.has_open() && first.is_some_and(|(order, _)| order.0.0)
+    }
+
+    /// How much waits for a worker.
+    pub(crate) fn open(&self) -> Amount {
+        self.open
+    }
+
+    /// Whether its costs are known.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.map.is_some()
+    }
+
+    /// Whether one waits for this worker.
+    pub(crate) fn has_for(&self, ask: &Ask) -> bool {
+        !self.given_up
+            && (self.shared_for(ask).is_some()
+                || self.troubled_for(ask).is_some()
+                || self.piece_for(ask).is_some())
+    }
+
+    /// The tile of which this worker is to make an attempt.
+    pub(crate) fn take(&mut self, ask: &Ask) -> Option<u32> {
+        while !self.given_up {
+            if let Some(tile) = self.shared_for(ask) {
+                self.shared.remove(&tile);
+                return Some(tile);
+            }
+            let piece = match self.troubled_for(ask) {
+                Some(index) => self.troubled.remove(index),
+                None => {
+                    let order = self.piece_for(ask)?;
+                    self.pieces.remove(&order)
+                }
+            }?;
+            let amount = self.amount(piece.region);
+            self.open.pixels -= amount.pixels;
+            self.open.cost -= amount.cost;
+            let piece = self.cut(piece, ask);
+            // What other attempts delivered late is not rendered again.
+            let rect = piece.region.rect(self.grid);
+            let missing = self.missing(rect);
+            if missing > 0 {
+                let Piece { region, trouble } = piece;
+                let tile = self.tiles.insert(Tile::new(region, rect, missing, trouble));
+                self.mark(region, tile);
+                return Some(tile);
+            }
+        }
+        None
+    }
+
+    fn shared_for(&self, ask: &Ask) -> Option<u32> {
+        let fits = |&&tile: &&u32| {
+            let tile = self.tiles.get(tile);
+            tile.is_some_and(|tile| self.fits(tile.region, ask))
+        };
+        self.shared.iter().find(fits).copied()
+    }
+
+    fn troubled_for(&self, ask: &Ask) -> Option<usize> {
+        let first = self.troubled.iter().take(LOOKED_AT_MAX);
+        first.into_iter().position(|piece| {
+            piece.trouble.suits(ask.worker, ask.able) && self.fits_smallest(piece.region, ask)
         })
     }
 
-    /// Lets a tile that was leased before wait for a worker, or no more.
-    pub(crate) fn set_open(&mut self, tile: u32, open: bool) {
-        if tile >= self.fresh {
-            return;
+    /// A worker that has time enough gets the first piece; one that is near its end the cheapest.
+    fn piece_for(&self, ask: &Ask) -> Option<Order> {
+        let (&order, piece) = match ask.fits {
+            None => return self.pieces.first_key_value().map(|(&order, _)| order),
+            Some(_) => self.pieces.last_key_value()?,
+        };
+        self.fits_smallest(piece.region, ask).then_some(order)
+    }
+
+    /// Whether the last cell that a piece is cut down to fits.
+    fn fits_smallest(&self, mut region: Region, ask: &Ask) -> bool {
+        if ask.fits.is_none() {
+            return true;
         }
-        if open {
-            self.reopened.insert(tile);
-        } else {
-            self.reopened.remove(&tile);
+        while let Some((first, second)) = region.split() {
+            region = self.choose(first, second, ask).0;
+        }
+        self.fits(region, ask)
+    }
+
+    fn fits(&self, region: Region, ask: &Ask) -> bool {
+        ask.fits.is_none_or(|fits| !self.exceeds(region, fits))
+    }
+
+    /// Cuts a piece down to what is asked for; the rest waits on.
+    fn cut(&mut self, mut piece: Piece, ask: &Ask) -> Piece {
+        loop {
+            let is_large = ask.most.is_none_or(|most| self.exceeds(piece.region, most))
+                || !self.fits(piece.region, ask);
+            let halves = piece.region.split().filter(|_| is_large);
+            let Some((first, second)) = halves else {
+                return piece;
+            };
+            let (taken, left) = self.choose(first, second, ask);
+            self.put(Piece {
+                region: left,
+                trouble: piece.trouble.clone(),
+            });
+            piece.region = taken;
         }
     }
 
-    /// Whether a tile waits for a worker.
-    pub(crate) fn is_open(&self, tile: u32) -> bool {
-        tile >= self.fresh || self.reopened.contains(&tile)
+    /// Of two halves the one that goes to this worker, and the other.
+    fn choose(&self, first: Region, second: Region, ask: &Ask) -> (Region, Region) {
+        let in_order = self.order(first) <= self.order(second);
+        match in_order == ask.fits.is_none() {
+            true => (first, second),
+            false => (second, first),
+        }
+    }
+
+    fn order(&self, region: Region) -> Order {
+        let focus = self
+            .focus
+            .map(|focus| focus.intersection(region.rect(self.grid)));
+        let peak = self.map.as_ref().map_or(0, |map| map.peak(region));
+        (
+            Reverse(focus.flatten().is_some()),
+            Reverse(peak),
+            region.node,
+        )
+    }
+
+    fn amount(&self, region: Region) -> Amount {
+        Amount {
+            pixels: region.rect(self.grid).area(),
+            cost: self.map.as_ref().map_or(0, |map| map.sum(region)),
+        }
+    }
+
+    fn exceeds(&self, region: Region, most: Amount) -> bool {
+        let amount = self.amount(region);
+        match self.map {
+            Some(_) => amount.cost > most.cost,
+            None => amount.pixels > most.pixels,
+        }
+    }
+
+    fn put(&mut self, piece: Piece) {
+        let amount = self.amount(piece.region);
+        self.open.pixels += amount.pixels;
+        self.open.cost += amount.cost;
+        if piece.trouble.failed_on.is_empty() {
+            self.pieces.insert(self.order(piece.region), piece);
+        } else {
+            self.troubled.push_back(piece);
+        }
+    }
+
+    fn mark(&mut self, region: Region, tile: u32) {
+        for index in region.indices(self.grid) {
+            self.cells[index] = tile;
+        }
+    }
+
+    /// Lets a tile that nobody renders wait again.
+    pub(crate) fn reopen(&mut self, tile: u32) {
+        if let Some(Tile {
+            region,
+            trouble,
+            missing,
+            ..
+        }) = self.close(tile)
+            && missing > 0
+        {
+            self.put(Piece { region, trouble });
+        }
+    }
+
+    /// Forgets a tile that is done.
+    pub(crate) fn close(&mut self, tile: u32) -> Option<Tile> {
+        self.shared.remove(&tile);
+        let closed = self.tiles.remove(tile)?;
+        self.mark(closed.region, NO_TILE);
+        Some(closed)
+    }
+
+    /// Opens a tile to a second attempt, or no more.
+    pub(crate) fn share(&mut self, tile: u32, shared: bool) {
+        if shared {
+            self.shared.insert(tile);
+        } else {
+            self.shared.remove(&tile);
+        }
+    }
+
+    pub(crate) fn is_shared(&self, tile: u32) -> bool {
+        self.shared.contains(&tile)
+    }
+
+    /// Moves what lies in a region of interest to the front.
+    pub(crate) fn focus(&mut self, focus: Option<Rect>) {
+        self.focus = focus;
+        for piece in core::mem::take(&mut self.pieces).into_values() {
+            self.pieces.insert(self.order(piece.region), piece);
+        }
+    }
+
+    /// The tile that a block is part of, if one is.
+    pub(crate) fn tile_of(&self, block: Rect) -> Option<u32> {
+        let cell = self.grid.index_of(block)?;
+        let tile = self.cells[cell as usize];
+        (tile != NO_TILE).then_some(tile)
     }
 
     /// The blocks of a tile that are missing, in order; empty where all are.
-    pub(crate) fn wanted(&self, tile: u32) -> Vec<Rect> {
-        let rect = self.rect(tile);
-        if self.tiles[tile as usize].missing == rect.area() {
+    pub(crate) fn wanted(&self, tile: &Tile) -> Vec<Rect> {
+        if tile.missing == tile.rect.area() {
             return Vec::new();
         }
-        rect.blocks()
-            .filter(|&block| !self.pixels.covers(block))
-            .collect()
-    }
-}
-
-impl Tile {
-    /// Live attempts.
-    pub(crate) fn attempts(&self) -> impl Iterator<Item = u64> {
-        self.live.into_iter().flatten()
+        let blocks = tile.rect.blocks();
+        blocks.filter(|&block| !self.pixels.covers(block)).collect()
     }
 
-    pub(crate) fn begins(&mut self, attempt: u64) {
-        let slot = self.live.iter_mut().find(|slot| slot.is_none());
-        *slot.expect("a tile is leased only while it has room for an attempt") = Some(attempt);
-    }
-
-    pub(crate) fn ends(&mut self, attempt: u64) {
-        for slot in &mut self.live {
-            if *slot == Some(attempt) {
-                *slot = None;
-            }
+    fn missing(&self, rect: Rect) -> u64 {
+        if self.pixels.count() == 0 {
+            return rect.area();
         }
+        rect.blocks().map(|block| self.pixels.missing(block)).sum()
+    }
+
+    /// What waits around a pixel, if it is part of a piece: what went wrong there.
+    pub(crate) fn trouble_at(&self, block: Rect) -> Option<&Trouble> {
+        let holds = |piece: &&Piece| piece.region.rect(self.grid).contains(block);
+        let mut pieces = self.troubled.iter().chain(self.pieces.values());
+        pieces.find(holds).map(|piece| &piece.trouble)
+    }
+
+    /// Asserts what must hold of it.
+    pub(crate) fn check(&self) {
+        let mut pixels = 0;
+        let mut open = Amount::default();
+        for (number, tile) in self.tiles.iter() {
+            let mut cells = tile.region.indices(self.grid);
+            assert!(cells.all(|cell| self.cells[cell] == number));
+            assert_eq!(tile.missing, self.missing(tile.rect));
+            assert!(tile.missing > 0, "a tile that is done is forgotten");
+            assert!(tile.live_count() > 0, "somebody renders a tile");
+            pixels += tile.rect.area();
+        }
+        for piece in self.pieces.values().chain(&self.troubled) {
+            let mut cells = piece.region.indices(self.grid);
+            assert!(cells.all(|cell| self.cells[cell] == NO_TILE));
+            open.pixels += self.amount(piece.region).pixels;
+            open.cost += self.amount(piece.region).cost;
+        }
+        for (&order, piece) in &self.pieces {
+            assert_eq!(order, self.order(piece.region));
+        }
+        assert_eq!(open, self.open);
+        assert!(
+            pixels + open.pixels <= self.grid.window().area(),
+            "no pixel is in two tiles"
+        );
+        assert!(
+            self.shared
+                .iter()
+                .all(|&tile| self.tiles.get(tile).is_some())
+        );
+        assert!(!self.pixels.is_complete(), "a complete image is encoded");
     }
 }

@@ -1,24 +1,40 @@
 //! A worker, as the scheduler knows it.
 
-use alloc::collections::BTreeSet;
+use alloc::vec::Vec;
 
-use model::{Revision, Span, Timestamp, WorkerId};
+use model::{Span, Timestamp, WorkerId};
 
-use crate::market::Load;
-use crate::{Link, LinkId, WorkerView};
+use crate::aside::Aside;
+use crate::market::Seat;
+use crate::needs::KindSet;
+use crate::pace::{Pace, cost_of, time_of};
+use crate::roster::Place;
+use crate::timers::Alarm;
+use crate::{Link, LinkId, Offer, WorkerView};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Worker {
-    pub(crate) revision: Revision,
-    pub(crate) threads: u32,
+    pub(crate) id: WorkerId,
+    pub(crate) offer: Offer,
+    /// The kinds of job that it serves.
+    pub(crate) kinds: KindSet,
     /// The newest link it came on.
     pub(crate) newest: LinkId,
     pub(crate) link: Link,
     pub(crate) credit: u32,
-    /// Its live attempts.
-    pub(crate) live: BTreeSet<u64>,
+    /// Its live attempts, in the order in which they were leased.
+    pub(crate) live: Vec<u64>,
     /// How many of them wait for something else of its: those not started, those being delivered.
     pub(crate) idle: u32,
+    /// What its live attempts cost together.
+    pub(crate) backlog: u64,
+    /// When it last began or ended something.
+    pub(crate) moved: Timestamp,
+    pub(crate) pace: Pace,
+    /// When it must be gone.
+    pub(crate) ends: Option<Timestamp>,
+    /// What it is set aside for.
+    pub(crate) aside: Aside,
     /// The newest limit for one block of what it holds.
     pub(crate) patience: Span,
     pub(crate) joined: Timestamp,
@@ -27,32 +43,41 @@ pub(crate) struct Worker {
     pub(crate) pixels: u64,
     pub(crate) render_time: Span,
     /// When it counts as lost.
-    pub(crate) lost: Option<Timestamp>,
-    /// When what it holds counts as forgotten; set while it holds something and renders nothing.
-    pub(crate) waiting: Option<Timestamp>,
+    pub(crate) lost: Alarm,
+    /// When what it holds counts as forgotten; due while it holds something and renders nothing.
+    pub(crate) waiting: Alarm,
     /// Where it stands in the market; `None` while it wants no tile.
-    pub(crate) load: Option<Load>,
+    pub(crate) seat: Option<(KindSet, Seat)>,
+    /// The kinds under which it is counted as able, and what it adds to the farm's capacity.
+    pub(crate) counted: Option<(KindSet, u64)>,
 }
 
 impl Worker {
-    pub(crate) fn new(revision: Revision, threads: u32, link: LinkId, now: Timestamp) -> Self {
+    pub(crate) fn new(id: WorkerId, offer: Offer, link: LinkId, now: Timestamp) -> Self {
         Self {
-            revision,
-            threads,
+            id,
+            offer,
+            kinds: KindSet::default(),
             newest: link,
             link: Link::Open,
             credit: 0,
-            live: BTreeSet::new(),
+            live: Vec::new(),
             idle: 0,
+            backlog: 0,
+            moved: now,
+            pace: Pace::default(),
+            ends: None,
+            aside: Aside::default(),
             patience: Span(0),
             joined: now,
             heard: now,
             blocks: 0,
             pixels: 0,
             render_time: Span(0),
-            lost: None,
-            waiting: None,
-            load: None,
+            lost: Alarm::default(),
+            waiting: Alarm::default(),
+            seat: None,
+            counted: None,
         }
     }
 
@@ -61,21 +86,68 @@ impl Worker {
         self.idle > 0 && self.idle as usize == self.live.len()
     }
 
-    /// Where it belongs in the market.
-    pub(crate) fn wants(&self) -> Option<Load> {
-        let wants = self.link == Link::Open && self.live.len() < self.credit as usize;
-        wants.then(|| Load::new(self.live.len(), self.threads))
+    /// Whether it takes tiles at all.
+    pub(crate) fn is_able(&self) -> bool {
+        self.link == Link::Open && self.credit > 0 && self.aside.farm().is_none()
     }
 
-    pub(crate) fn view(&self, worker: WorkerId) -> WorkerView {
+    /// The kinds under which it counts as able, and what it adds to the farm's capacity.
+    pub(crate) fn counts(&self) -> Option<(KindSet, u64)> {
+        let capacity = u64::from(self.offer.threads) * u64::from(self.pace.speed());
+        self.is_able().then_some((self.kinds, capacity))
+    }
+
+    /// Where it belongs in the market.
+    pub(crate) fn wants(&self, place: Place) -> Option<(KindSet, Seat)> {
+        let wants = self.is_able() && self.live.len() < self.credit as usize;
+        wants.then(|| {
+            let seat = Seat::new(
+                self.live.len(),
+                self.offer.threads,
+                self.pace.speed(),
+                place,
+            );
+            (self.kinds, seat)
+        })
+    }
+
+    /// When a tile that is leased to it now is expected to be begun.
+    pub(crate) fn begins_next(&self, now: Timestamp) -> Timestamp {
+        let threads = self.offer.threads as usize;
+        if self.live.len() < threads {
+            return now;
+        }
+        let busy = threads.min(self.live.len()) as u64;
+        let speed = self.pace.speed();
+        let done = cost_of(now - self.moved, speed).saturating_mul(busy);
+        let left = self.backlog.saturating_sub(done);
+        now + time_of(left / u64::from(self.offer.threads.max(1)), speed)
+    }
+
+    /// How long it has left for a tile that is leased to it now; absent where nobody set a limit.
+    pub(crate) fn time_left(&self, now: Timestamp) -> Option<Span> {
+        Some(self.ends? - self.begins_next(now))
+    }
+
+    /// Whether one of its live attempts cannot have been started yet: a thread starts
+    /// what was leased first.
+    pub(crate) fn holds_ahead(&self, number: u64, is_rendered: impl Fn(u64) -> bool) -> bool {
+        let before = self.live.iter().take_while(|&&live| live != number);
+        before.filter(|&&live| !is_rendered(live)).count() >= self.offer.threads as usize
+    }
+
+    pub(crate) fn view(&self) -> WorkerView {
+        let attempts = u32::try_from(self.live.len()).unwrap_or(u32::MAX);
         WorkerView {
-            worker,
-            revision: self.revision,
-            threads: self.threads,
+            worker: self.id,
+            revision: self.offer.revision,
+            threads: self.offer.threads,
             link: self.link,
             credit: self.credit,
-            attempts: u32::try_from(self.live.len()).unwrap_or(u32::MAX),
-            running: u32::try_from(self.live.len()).unwrap_or(u32::MAX) - self.idle,
+            attempts,
+            running: attempts - self.idle,
+            speed: self.pace.speed(),
+            aside: self.aside.farm(),
             heard: self.heard,
             joined: self.joined,
             blocks: self.blocks,

@@ -1,22 +1,23 @@
 //! Random histories: whatever workers, users and the network do, what must hold holds.
 //!
 //! The scheduler is told random events, late and repeated ones among them, and
-//! is held against a plain model of what it said. In the end a diligent worker
-//! joins and every job must come to its end. `PROPTEST_CASES=20000` looks longer.
+//! is held against a plain model of what it said. In the end diligent workers
+//! join and every job must come to its end; or the coordinator dies first, and what it had
+//! committed is told to another one. `PROPTEST_CASES=20000` looks longer.
 
 mod situation;
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use model::{
-    AttemptId, ImageRef, JobId, Lease, Rect, Resolution, Revision, Running, Span, SubmissionId,
-    Timestamp, WorkerId,
+    AttemptId, Digest, Epoch, ImageRef, JobId, Lease, Rect, Resolution, Revision, Running, Span,
+    SubmissionId, Timestamp, WorkerId,
 };
 use proptest::prelude::*;
 use proptest::sample::Index;
 use sched::{
-    BlockRef, Config, Effect, Event, ImageState, JobState, LinkId, Sched, Submission, TileShape,
-    Verdict,
+    BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, JobState, LinkId, Needs,
+    Offer, Sched, Submission, TileShape, Verdict,
 };
 use situation::{EPOCH, film, worker};
 
@@ -25,10 +26,14 @@ use situation::{EPOCH, film, worker};
 enum Step {
     Submit {
         images: u32,
-        tile: (u32, u32),
+        tiles: TileShape,
         revision: u32,
+        priority: i32,
+        share: u32,
+        needs: Needs,
+        after: Option<Index>,
     },
-    Cancel(Index),
+    Command(Index, Wish),
     /// A worker dials, and still holds those of its attempts that are picked.
     Join {
         worker: u64,
@@ -44,6 +49,7 @@ enum Step {
     Block {
         attempt: Index,
         block: Index,
+        pixels: u8,
     },
     /// All blocks of it.
     Tile(Index),
@@ -57,19 +63,91 @@ enum Step {
     Again(Index),
 }
 
+/// What a user wants; an index picks an image.
+#[derive(Clone, Debug)]
+enum Wish {
+    Just(Command),
+    Again(Index),
+}
+
+fn wish() -> impl Strategy<Value = Wish> {
+    let just = |command| Just(Wish::Just(command));
+    prop_oneof![
+        just(Command::Pause),
+        just(Command::Resume),
+        just(Command::Cancel),
+        just(Command::Retry),
+        just(Command::Remove),
+        just(Command::Focus(None)),
+        (0..60_u32, 0..40_u32).prop_map(|(x0, y0)| {
+            let focus = Rect {
+                x0,
+                y0,
+                x1: x0 + 9,
+                y1: y0 + 9,
+            };
+            Wish::Just(Command::Focus(Some(focus)))
+        }),
+        (-1..2).prop_map(|priority| Wish::Just(Command::Priority(priority))),
+        (0..3_u32).prop_map(|share| Wish::Just(Command::Share(share))),
+        any::<Index>().prop_map(Wish::Again),
+    ]
+}
+
+fn shape() -> impl Strategy<Value = TileShape> {
+    let size = (10..70_u32, 10..70_u32);
+    prop_oneof![
+        size.prop_map(|(width, height)| TileShape::Size { width, height }),
+        (0..100_000_u64).prop_map(|micros| TileShape::Time {
+            aim: Some(Span(micros))
+        }),
+        Just(TileShape::Time { aim: None }),
+        Just(TileShape::Rule {
+            min_tile_pixels: Some(500)
+        }),
+    ]
+}
+
+fn needs() -> impl Strategy<Value = Needs> {
+    let labels = prop_oneof![3 => Just(None), 1 => Just(Some("fast".to_owned()))];
+    (labels, 0..3_u32, 0..2_u64).prop_map(|(label, threads, memory_bytes)| Needs {
+        labels: label.into_iter().collect(),
+        threads,
+        memory_bytes,
+    })
+}
+
+fn submit() -> impl Strategy<Value = Step> {
+    let after = prop::option::weighted(0.2, any::<Index>());
+    let rank = (0..2_u32, -1..2_i32, 1..4_u32);
+    (1..4_u32, shape(), rank, needs(), after).prop_map(|(images, tiles, rank, needs, after)| {
+        let (revision, priority, share) = rank;
+        Step::Submit {
+            images,
+            tiles,
+            revision,
+            priority,
+            share,
+            needs,
+            after,
+        }
+    })
+}
+
 fn step() -> impl Strategy<Value = Step> {
     let worker = 0..4_u64;
     let index = any::<Index>;
+    let pixels = prop_oneof![19 => Just(1), 1 => Just(2)];
     prop_oneof![
-        2 => (1..4_u32, (10..70_u32, 10..70_u32), 0..2_u32).prop_map(|(images, tile, revision)| {
-            Step::Submit { images, tile, revision }
-        }),
-        1 => index().prop_map(Step::Cancel),
+        2 => submit(),
+        4 => (index(), wish()).prop_map(|(job, wish)| Step::Command(job, wish)),
         6 => (worker.clone(), any::<u64>()).prop_map(|(worker, held)| Step::Join { worker, held }),
         3 => worker.clone().prop_map(Step::LinkBreaks),
         8 => (worker.clone(), 0..5_u32).prop_map(|(worker, credit)| Step::Credit { worker, credit }),
         6 => worker.clone().prop_map(Step::Heartbeat),
-        20 => (index(), index()).prop_map(|(attempt, block)| Step::Block { attempt, block }),
+        20 => (index(), index(), pixels).prop_map(|(attempt, block, pixels)| {
+            Step::Block { attempt, block, pixels }
+        }),
         20 => index().prop_map(Step::Tile),
         3 => index().prop_map(Step::Fails),
         3 => index().prop_map(Step::GivesBack),
@@ -86,7 +164,8 @@ fn step() -> impl Strategy<Value = Step> {
 struct History {
     sched: Sched,
     now: Timestamp,
-    told: Vec<Event>,
+    /// What was told, and how often the scratch file of its image had been dropped by then.
+    told: Vec<(Event, u32)>,
     links: u64,
 
     /// Every lease there ever was.
@@ -96,16 +175,30 @@ struct History {
     encoding: BTreeSet<ImageRef>,
     begun_encoding: BTreeSet<ImageRef>,
     over: BTreeSet<JobId>,
+    drops: BTreeMap<ImageRef, u32>,
+}
+
+/// The image that something is reported of.
+fn image_of(event: &Event) -> Option<ImageRef> {
+    match event {
+        Event::BlockStored { block, .. } => Some(block.image),
+        Event::ImageEncoded { image, .. } | Event::ImageFailed { image, .. } => Some(*image),
+        _ => None,
+    }
+}
+
+fn config() -> Config {
+    Config {
+        images_in_flight_max: 2,
+        aside: Span::from_secs(20),
+        ..Config::new(EPOCH)
+    }
 }
 
 impl History {
     fn new() -> Self {
-        let config = Config {
-            images_in_flight_max: 2,
-            ..Config::new(EPOCH)
-        };
         Self {
-            sched: Sched::new(config),
+            sched: Sched::new(config()),
             now: Timestamp(1),
             told: Vec::new(),
             links: 0,
@@ -115,6 +208,7 @@ impl History {
             encoding: BTreeSet::new(),
             begun_encoding: BTreeSet::new(),
             over: BTreeSet::new(),
+            drops: BTreeMap::new(),
         }
     }
 
@@ -126,11 +220,51 @@ impl History {
         let mut again = Vec::new();
         twin.handle(self.now, event.clone(), &mut again);
         assert_eq!(effects, again, "the same event gives the same effects");
-        self.told.push(event);
+        let is_command = matches!(event, Event::Command { .. });
+        let drops = image_of(&event).and_then(|image| self.drops.get(&image));
+        let drops = drops.copied().unwrap_or(0);
+        self.told.push((event, drops));
+        self.over.retain(|&job| {
+            let view = self.sched.job(job);
+            view.is_some_and(|view| view.state != JobState::Running)
+        });
+        if is_command {
+            self.drop_what_waits_again();
+        }
+        let mut given_up = Vec::new();
         for effect in effects {
-            self.hear(effect);
+            if let Effect::GiveUp { image, reason } = effect {
+                given_up.push(Event::ImageFailed { image, reason });
+            } else {
+                self.hear(effect);
+            }
         }
         self.check();
+        for event in given_up {
+            self.tell(event);
+        }
+    }
+
+    /// An image that was finished and waits again has no pixels.
+    fn drop_what_waits_again(&mut self) {
+        let images: Vec<ImageRef> = self.durable.keys().copied().collect();
+        for image in images {
+            let view = self.sched.image(image);
+            let waits = |view: sched::ImageView| {
+                let begins = [ImageState::Waiting, ImageState::Rendering].contains(&view.state);
+                begins && view.pixels_done == 0
+            };
+            if view.is_none_or(waits) {
+                self.drop(image);
+            }
+        }
+    }
+
+    fn drop(&mut self, image: ImageRef) {
+        self.encoding.remove(&image);
+        self.begun_encoding.remove(&image);
+        self.durable.remove(&image);
+        *self.drops.entry(image).or_default() += 1;
     }
 
     fn hear(&mut self, effect: Effect) {
@@ -149,10 +283,16 @@ impl History {
                 assert!(self.begun_encoding.insert(image), "encoded once");
                 self.encoding.insert(image);
             }
-            Effect::DropScratch { image } => {
-                self.encoding.remove(&image);
+            Effect::DropScratch { image } => self.drop(image),
+            Effect::JobDone { job, .. } => {
+                // One that is removed is forgotten at once.
+                let known = self.sched.job(job).is_some();
+                assert!(self.over.insert(job) || !known, "over once");
             }
-            Effect::JobDone { job, .. } => assert!(self.over.insert(job), "over once"),
+            Effect::ForgetJob { job } => {
+                self.over.remove(&job);
+                self.durable.retain(|image, _| image.job != job);
+            }
             _ => {}
         }
     }
@@ -170,7 +310,9 @@ impl History {
         let durable = self.durable.entry(lease.image).or_default();
         let missing = |block: &Rect| pixels_of(*block).any(|pixel| !durable.contains(&pixel));
         let missing: Vec<Rect> = lease.tile.blocks().filter(missing).collect();
-        assert_eq!(lease.blocks().collect::<Vec<_>>(), missing);
+        let mut blocks: Vec<Rect> = lease.blocks().collect();
+        blocks.sort_by_key(|block| (block.y0, block.x0));
+        assert_eq!(blocks, missing, "exactly what is missing is leased");
         let before = self.leases.insert(lease.attempt, (worker, lease));
         assert_eq!(before, None, "an attempt is leased once");
     }
@@ -196,6 +338,12 @@ impl History {
             }
         }
         assert!(live.values().all(|&attempts| attempts <= 2));
+        for (index, (image, tile)) in live.keys().enumerate() {
+            let mut others = live.keys().skip(index + 1);
+            let apart =
+                others.all(|(other, rect)| other != image || tile.intersection(*rect).is_none());
+            assert!(apart, "no pixel is in two tiles");
+        }
         for job in self.sched.jobs() {
             let of_job = self
                 .durable
@@ -211,18 +359,8 @@ impl History {
 
     fn take(&mut self, step: Step) {
         match step {
-            Step::Submit {
-                images,
-                tile,
-                revision,
-            } => self.submit(images, tile, revision),
-            Step::Cancel(index) => {
-                let jobs: Vec<JobId> = self.sched.jobs().map(|job| job.job).collect();
-                if !jobs.is_empty() {
-                    let job = *index.get(&jobs);
-                    self.tell(Event::Cancel { job });
-                }
-            }
+            Step::Submit { .. } => self.submit(step),
+            Step::Command(index, wish) => self.command(&index, wish),
             Step::Join { worker: id, held } => self.join(id, held),
             Step::LinkBreaks(id) => {
                 let link = LinkId(self.links);
@@ -236,16 +374,20 @@ impl History {
                 credit,
             }),
             Step::Heartbeat(id) => self.heartbeat(id),
-            Step::Block { attempt, block } => {
+            Step::Block {
+                attempt,
+                block,
+                pixels,
+            } => {
                 if let Some((attempt, lease)) = self.pick(&attempt) {
                     let blocks: Vec<Rect> = lease.tile.blocks().collect();
-                    self.block(attempt, &lease, *block.get(&blocks));
+                    self.block(attempt, &lease, (*block.get(&blocks), pixels));
                 }
             }
             Step::Tile(attempt) => {
                 if let Some((attempt, lease)) = self.pick(&attempt) {
                     for rect in lease.blocks() {
-                        self.block(attempt, &lease, rect);
+                        self.block(attempt, &lease, (rect, 1));
                     }
                 }
             }
@@ -282,14 +424,32 @@ impl History {
             Step::Wait(milliseconds) => self.wait(Span::from_millis(milliseconds)),
             Step::Again(index) => {
                 if !self.told.is_empty() {
-                    let event = index.get(&self.told).clone();
-                    self.tell(event);
+                    let (event, drops) = index.get(&self.told).clone();
+                    // A shell reports nothing of a scratch file that was dropped.
+                    let now = image_of(&event).and_then(|image| self.drops.get(&image));
+                    if now.copied().unwrap_or(0) == drops {
+                        self.tell(event);
+                    }
                 }
             }
         }
     }
 
-    fn submit(&mut self, images: u32, tile: (u32, u32), revision: u32) {
+    fn submit(&mut self, step: Step) {
+        let Step::Submit {
+            images,
+            tiles,
+            revision,
+            priority,
+            share,
+            needs,
+            after,
+        } = step
+        else {
+            return;
+        };
+        let jobs: Vec<JobId> = self.sched.jobs().map(|job| job.job).collect();
+        let after = after.filter(|_| !jobs.is_empty());
         self.tell(Event::Submit(Submission {
             submission: SubmissionId(self.told.len() as u128),
             revision: Revision(revision),
@@ -298,12 +458,29 @@ impl History {
                 height: 45,
             }
             .rect(),
-            tiles: TileShape::Size {
-                width: tile.0,
-                height: tile.1,
-            },
+            tiles,
+            priority,
+            share,
+            needs,
+            after: after.iter().map(|index| *index.get(&jobs)).collect(),
             ..situation::submission(0, images)
         }));
+    }
+
+    fn command(&mut self, index: &Index, wish: Wish) {
+        let jobs: Vec<JobId> = self.sched.jobs().map(|job| job.job).collect();
+        if jobs.is_empty() {
+            return;
+        }
+        let job = *index.get(&jobs);
+        let command = match wish {
+            Wish::Just(command) => command,
+            Wish::Again(index) => {
+                let images: Vec<_> = self.sched.images(job).map(|view| view.image).collect();
+                Command::Again(*index.get(&images))
+            }
+        };
+        self.tell(Event::Command { job, command });
     }
 
     fn join(&mut self, id: u64, held: u64) {
@@ -314,8 +491,13 @@ impl History {
         self.tell(Event::WorkerJoined {
             worker: worker(id),
             link: LinkId(self.links),
-            revision: Revision(u32::from(id == 3)),
-            threads: 1 + u32::from(id == 2),
+            offer: Offer {
+                revision: Revision(u32::from(id == 3)),
+                threads: 1 + u32::from(id >= 2),
+                memory_bytes: u64::from(id >= 1),
+                labels: (id != 1).then(|| "fast".to_owned()).into_iter().collect(),
+                time_left: (id == 1).then_some(Span::from_secs(40)),
+            },
             held: held.map(|(&attempt, _)| attempt).collect(),
         });
     }
@@ -348,7 +530,7 @@ impl History {
     }
 
     /// A block arrives: the shell asks, and tells what it stored.
-    fn block(&mut self, attempt: AttemptId, lease: &Lease, rect: Rect) {
+    fn block(&mut self, attempt: AttemptId, lease: &Lease, (rect, pixels): (Rect, u8)) {
         let worker = self.leases[&attempt].0;
         let image = lease.image;
         let block = BlockRef {
@@ -361,6 +543,7 @@ impl History {
                 worker,
                 block,
                 elapsed: Span(10_000),
+                pixels: Digest([pixels; 32]),
             });
         }
     }
@@ -407,9 +590,60 @@ impl History {
         assert_eq!(self.sched.next_deadline(), None);
     }
 
-    /// Diligent workers of both revisions finish what is left.
+    /// The coordinator dies; another one is told what was committed.
+    fn begin_anew(&mut self) {
+        let mut sched = Sched::new(Config {
+            epoch: Epoch(EPOCH.0 + 1),
+            ..config()
+        });
+        for (event, _) in self.told.iter().filter(|(event, _)| event.is_durable()) {
+            sched.handle(Timestamp(1), event.clone(), &mut Vec::new());
+            sched.check_invariants();
+        }
+        assert_eq!(sched.jobs().count(), self.sched.jobs().count());
+        for (before, after) in self.sched.jobs().zip(sched.jobs()) {
+            assert_eq!(after.job, before.job);
+            assert_eq!(after.state, before.state, "{before:?} {after:?}");
+            assert_eq!(after.pixels_done, before.pixels_done);
+            let rank = |job: &sched::JobView<'_>| (job.priority, job.share, job.paused);
+            assert_eq!(rank(&after), rank(&before));
+            assert_eq!(after.after, before.after);
+            for (before, after) in self.sched.images(before.job).zip(sched.images(after.job)) {
+                assert_eq!(after.pixels_done, before.pixels_done);
+                let begun = |state| match state {
+                    ImageState::Rendering => ImageState::Waiting,
+                    state => state,
+                };
+                assert_eq!(begun(after.state), begun(before.state));
+            }
+            assert_eq!(sched.failures(before.job), self.sched.failures(before.job));
+        }
+        self.sched = sched;
+        self.now = Timestamp(1);
+        self.leases.clear();
+        // What was being encoded is encoded anew.
+        let jobs: Vec<JobId> = self.sched.jobs().map(|job| job.job).collect();
+        for job in jobs {
+            for view in self.sched.images(job) {
+                let image = ImageRef {
+                    job,
+                    image: view.image,
+                };
+                if view.state == ImageState::Encoding {
+                    self.encoding.insert(image);
+                }
+            }
+        }
+    }
+
+    /// Diligent workers of both revisions, and a diligent user, finish what is left.
     fn finish(&mut self) {
-        for id in [0, 3] {
+        let jobs: Vec<JobId> = self.sched.jobs().map(|job| job.job).collect();
+        for &job in &jobs {
+            let command = Command::Resume;
+            self.tell(Event::Command { job, command });
+        }
+        for id in [0, 2, 3] {
             self.join(id, 0);
             self.tell(Event::Credit {
                 worker: worker(id),
@@ -424,13 +658,16 @@ impl History {
             if let Some(&attempt) = live {
                 let lease = self.leases[&attempt].1.clone();
                 for rect in lease.blocks() {
-                    self.block(attempt, &lease, rect);
+                    self.block(attempt, &lease, (rect, 1));
                 }
             } else if let Some(image) = self.encoding.pop_first() {
                 self.tell(Event::ImageEncoded {
                     image,
                     film: film(1),
                 });
+            } else if let Some(job) = self.waits_in_vain() {
+                let command = Command::Cancel;
+                self.tell(Event::Command { job, command });
             } else {
                 break;
             }
@@ -439,6 +676,20 @@ impl History {
             assert_ne!(job.state, JobState::Running, "{job:?}");
             assert_eq!(job.attempts_live, 0);
         }
+    }
+
+    /// A job that waits for one that is over and not finished.
+    fn waits_in_vain(&self) -> Option<JobId> {
+        let is_over = |job: &JobId| {
+            let state = self.sched.job(*job).map(|job| job.state);
+            matches!(
+                state,
+                Some(JobState::Over(JobOutcome::Failed | JobOutcome::Cancelled))
+            )
+        };
+        let mut jobs = self.sched.jobs();
+        let vain = jobs.find(|job| job.after.iter().any(is_over));
+        vain.map(|job| job.job)
     }
 }
 
@@ -454,6 +705,16 @@ proptest! {
             history.take(step);
         }
         history.fall_silent();
+        history.finish();
+    }
+
+    #[test]
+    fn what_is_durable_comes_back(steps in prop::collection::vec(step(), 1..120)) {
+        let mut history = History::new();
+        for step in steps {
+            history.take(step);
+        }
+        history.begin_anew();
         history.finish();
     }
 }

@@ -112,9 +112,10 @@ impl Inbox {
             )));
         }
         let tiles = match head.tile {
-            None => sched::TileShape::Rule {
-                min_tile_pixels: (head.min_tile_pixels > 0).then_some(head.min_tile_pixels),
+            None if head.min_tile_pixels > 0 => sched::TileShape::Rule {
+                min_tile_pixels: Some(head.min_tile_pixels),
             },
+            None => sched::TileShape::Time { aim: None },
             Some(proto::TileShape { width, height }) => sched::TileShape::Size { width, height },
         };
         Ok(NewJob {
@@ -126,6 +127,10 @@ impl Inbox {
                 frames,
                 window: film.window,
                 tiles,
+                priority: 0,
+                share: 1,
+                needs: sched::Needs::default(),
+                after: Vec::new(),
             },
             description: Arc::new(description),
             upload,

@@ -146,6 +146,8 @@ pub(crate) struct Arrived {
     pub(crate) block: BlockRef,
     /// The record's payload.
     pub(crate) payload: Bytes,
+    /// The digest of the payload.
+    pub(crate) pixels: Digest,
     /// How long one thread took.
     pub(crate) elapsed: Span,
     /// What was counted.

@@ -5,13 +5,15 @@
     reason = "each test program uses its own part of the language"
 )]
 
+use std::collections::BTreeSet;
+
 use model::{
     AttemptId, Digest, Epoch, ImageNumber, ImageRef, JobId, Lease, Rect, Resolution, Revision,
     Running, Span, SubmissionId, Timestamp, WorkerId,
 };
 use sched::{
-    BlockRef, Config, Effect, Event, JobOutcome, LinkId, RevokeReason, Sched, Submission,
-    TileShape, Verdict,
+    BlockRef, Command, Config, Effect, Event, JobOutcome, LinkId, Needs, Offer, RevokeReason,
+    Sched, Submission, TileShape, Verdict,
 };
 
 pub(crate) const EPOCH: Epoch = Epoch(3);
@@ -35,11 +37,33 @@ impl Farm {
         }
     }
 
-    /// Something happens now.
+    /// Something happens now. An image that is given up is failed at once, as a shell does it.
     pub(crate) fn is_told(&mut self, event: Event) -> &mut Self {
+        let before = self.effects.len();
         self.sched.handle(self.now, event, &mut self.effects);
         self.sched.check_invariants();
+        let given_up = |effect: &Effect| match effect {
+            Effect::GiveUp { image, reason } => Some((*image, reason.clone())),
+            _ => None,
+        };
+        let images: Vec<_> = self.effects[before..].iter().filter_map(given_up).collect();
+        for (image, reason) in images {
+            self.is_told(Event::ImageFailed { image, reason });
+        }
         self
+    }
+
+    /// A user wants something of the first job.
+    pub(crate) fn command(&mut self, command: Command) -> &mut Self {
+        self.command_of(1, command)
+    }
+
+    /// A user wants something of a job.
+    pub(crate) fn command_of(&mut self, job: u64, command: Command) -> &mut Self {
+        self.is_told(Event::Command {
+            job: JobId(job),
+            command,
+        })
     }
 
     /// A job of so many images, each of two tiles of two blocks: see [`tile`].
@@ -53,8 +77,7 @@ impl Farm {
         self.is_told(Event::WorkerJoined {
             worker: worker(id),
             link: LinkId(self.links),
-            revision: REVISION,
-            threads: 1,
+            offer: offer(),
             held: held.iter().copied().map(attempt).collect(),
         })
     }
@@ -93,6 +116,7 @@ impl Farm {
             worker: worker(id),
             block: block_ref(number, image, rect),
             elapsed: Span::from_millis(1),
+            pixels: Digest([1; 32]),
         })
     }
 
@@ -200,7 +224,27 @@ pub(crate) fn submission(id: u128, images: u32) -> Submission {
             width: 64,
             height: 32,
         },
+        priority: 0,
+        share: 1,
+        needs: Needs::default(),
+        after: vec![],
     }
+}
+
+/// What a worker of one thread offers.
+pub(crate) fn offer() -> Offer {
+    Offer {
+        revision: REVISION,
+        threads: 1,
+        memory_bytes: 0,
+        labels: BTreeSet::new(),
+        time_left: None,
+    }
+}
+
+/// What a command that was followed is answered.
+pub(crate) fn commanded() -> Effect {
+    Effect::Commanded { job: JobId(1) }
 }
 
 /// The upper or the lower half of an image.
@@ -321,5 +365,12 @@ pub(crate) fn done(outcome: JobOutcome) -> Effect {
     Effect::JobDone {
         job: JobId(1),
         outcome,
+    }
+}
+
+pub(crate) fn give_up(image: u32, reason: &str) -> Effect {
+    Effect::GiveUp {
+        image: image_ref(image),
+        reason: reason.into(),
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use model::{Span, WorkerId};
+use model::{Digest, Span, WorkerId};
 use sched::{BlockRef, LinkId};
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio::time::timeout;
@@ -113,6 +113,7 @@ impl Listener {
             Ok((header, payload, counters)) => {
                 // Waiting here stops reading, and so in the end the worker's sending.
                 let permit = self.blocks.clone().acquire_owned().await.map_err(drop)?;
+                let pixels = Digest(blake3::hash(&payload).into());
                 let arrived = Arrived {
                     worker: self.worker,
                     block: BlockRef {
@@ -121,6 +122,7 @@ impl Listener {
                         rect: header.rect,
                     },
                     payload,
+                    pixels,
                     elapsed: Span(delivery.render_us),
                     counters,
                     _permit: permit,

@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use image::{FrameMetadata, ScratchIdentity, ViewTransform};
 use model::{ImageNumber, JobId, SubmissionId, WorkerId};
-use sched::{BlockRef, BlockRefusal, Effect, JobOutcome, RevokeReason, WorkerRefusal};
+use sched::{BlockRef, BlockRefusal, Effect, Event, JobOutcome, RevokeReason, WorkerRefusal};
 use tonic::Status;
 use wire::Failure;
 use wire::proto::{self, ErrorKind, control_down, deliver_down};
@@ -89,6 +89,14 @@ impl Shell {
                 }
                 self.jobs.touch_image(image);
             }
+            Effect::GiveUp { image, reason } => self.feed(Event::ImageFailed { image, reason }),
+            Effect::Incident {
+                block,
+                worker,
+                other,
+            } => self.incident(block, worker, other),
+            // Nobody waits for these words: whoever cancels is shown the job.
+            Effect::Commanded { .. } | Effect::CommandRefused { .. } => {}
             Effect::DropScratch { image } => {
                 if let Some(job) = self.jobs.get_mut(image.job) {
                     job.take_counters(image.image);
@@ -99,7 +107,9 @@ impl Shell {
             Effect::DropJob { job } => self.clear_job(job),
             Effect::JobDone { job, outcome } => self.job_done(job, outcome),
             Effect::ForgetJob { job } => {
-                self.jobs.remove(job);
+                if let Some(mut job) = self.jobs.remove(job) {
+                    self.drop_upload(&mut job);
+                }
             }
             Effect::JobChanged { job } => {
                 self.jobs.touch(job);
@@ -221,7 +231,7 @@ impl Shell {
         let kind = match refusal {
             WorkerRefusal::WrongRevision { .. } => ErrorKind::WrongRevision,
             WorkerRefusal::TooMany { .. } => ErrorKind::Limit,
-            WorkerRefusal::NoThreads => ErrorKind::BadRequest,
+            WorkerRefusal::NoThreads | WorkerRefusal::TooManyLabels { .. } => ErrorKind::BadRequest,
         };
         let failure = match refusal.is_retryable() {
             true => Failure::later(kind, refusal.to_string()),
@@ -283,21 +293,41 @@ impl Shell {
 
     /// Removes what a job that is over leaves beside its frames.
     fn clear_job(&mut self, id: JobId) {
+        let cancelled = sched::JobState::Over(JobOutcome::Cancelled);
+        let is_cancelled = self.sched.job(id).is_none_or(|job| job.state == cancelled);
         let Some(job) = self.jobs.get_mut(id) else {
             return;
         };
-        if let Some(upload) = job.upload.take() {
-            self.storage.remove(upload);
-        }
-        if self
-            .sched
-            .job(id)
-            .is_some_and(|job| job.state == sched::JobState::Over(JobOutcome::Cancelled))
-        {
+        if is_cancelled {
             job.plan.cancelled.store(true, Ordering::Relaxed);
+            if let Some(upload) = job.upload.take() {
+                self.storage.remove(upload);
+            }
         }
         let folders = job.folders().clone();
         self.storage.clear(folders);
+    }
+
+    /// Removes the scene and assets of a job that nothing can be asked of any more.
+    fn drop_upload(&self, job: &mut Job) {
+        if let Some(upload) = job.upload.take() {
+            self.storage.remove(upload);
+        }
+    }
+
+    /// Two workers made different pixels of one block.
+    fn incident(&mut self, block: BlockRef, worker: WorkerId, other: Option<WorkerId>) {
+        let name = self.worker_name(worker);
+        let other = other.map_or_else(|| "another".to_owned(), |other| self.worker_name(other));
+        let (image, rect) = (block.image, block.rect);
+        tracing::error!(job = %image.job, image = %image.image, ?rect, %worker, name, other, "two renderings of one block differ");
+        self.say(
+            image.job,
+            format!(
+                "frame {}: workers {name} and {other} made different pixels at {},{}; the first to arrive are kept",
+                image.image, rect.x0, rect.y0
+            ),
+        );
     }
 
     /// Tells a job's log of attempts that failed or were lost since it was last told.
@@ -423,6 +453,9 @@ fn revoke_words(reason: RevokeReason) -> &'static str {
     match reason {
         RevokeReason::TileDone => "every pixel of the tile is durable",
         RevokeReason::Cancelled => "the job was cancelled",
+        RevokeReason::Paused => "the job pauses",
+        RevokeReason::CalledBack => "another worker has nothing to do",
+        RevokeReason::Differs => "its pixels differ from another worker's",
         RevokeReason::ImageFailed => "the image failed",
         RevokeReason::NoProgress => "no block came for too long",
         RevokeReason::NotLive => "the attempt had ended before",

@@ -1,7 +1,9 @@
 //! From inputs to events.
 
+use std::collections::BTreeSet;
+
 use model::{ImageRef, JobId, WorkerId};
-use sched::{Event, LinkId, Verdict};
+use sched::{Command, Event, LinkId, Offer, Verdict};
 use wire::proto::{self, ErrorKind, deliver_down};
 use wire::{Failure, convert};
 
@@ -20,7 +22,8 @@ impl Shell {
             Input::Cancel(job, reply) => {
                 let known = self.sched.job(job).is_some();
                 if known {
-                    self.feed(Event::Cancel { job });
+                    let command = Command::Cancel;
+                    self.feed(Event::Command { job, command });
                 }
                 let _ = reply.send(self.summary(job).ok_or_else(|| super::views::no_job(job)));
             }
@@ -82,8 +85,13 @@ impl Shell {
         let event = Event::WorkerJoined {
             worker,
             link: link.id,
-            revision,
-            threads,
+            offer: Offer {
+                revision,
+                threads,
+                memory_bytes: about.memory_bytes,
+                labels: BTreeSet::new(),
+                time_left: None,
+            },
             held,
         };
         // An older link of the same process is dropped with its streams.
@@ -169,6 +177,7 @@ impl Shell {
                 worker,
                 block,
                 elapsed: arrived.elapsed,
+                pixels: arrived.pixels,
             }),
             Verdict::Refuse(refusal) => self.refuse_block(worker, block, refusal),
         }
@@ -180,6 +189,7 @@ impl Shell {
             worker,
             block,
             elapsed,
+            pixels,
             counters,
             ..
         } = arrived;
@@ -192,6 +202,7 @@ impl Shell {
                     worker,
                     block,
                     elapsed,
+                    pixels,
                 });
                 // Another attempt's had made its pixels durable, or nobody wants them.
                 if self.blocks_done(block.image.job) == before {

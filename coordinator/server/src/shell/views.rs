@@ -28,7 +28,6 @@ pub(super) fn summary(clock: &Clock, view: &JobView<'_>, job: &Job) -> proto::Jo
         sched::JobState::Over(JobOutcome::Failed) => proto::JobState::Failed,
         sched::JobState::Over(JobOutcome::Cancelled) => proto::JobState::Cancelled,
     };
-    let (width, height) = view.tile_size;
     proto::JobSummary {
         job: view.job.0,
         name: view.name.to_owned(),
@@ -63,8 +62,10 @@ pub(super) fn summary(clock: &Clock, view: &JobView<'_>, job: &Job) -> proto::Jo
             })
             .collect(),
         render_us: view.render_time.0,
-        tiles_per_image: view.tiles_per_image,
-        tile: Some(proto::TileShape { width, height }),
+        tiles_per_image: view.tiles.map_or(0, |(_, count)| count),
+        tile: view
+            .tiles
+            .map(|((width, height), _)| proto::TileShape { width, height }),
         attempts_live: view.attempts_live,
         attempts_failed: view.attempts_failed,
         attempts_lost: view.attempts_lost,

@@ -1,0 +1,163 @@
+//! Workers that fail where others succeed are set aside, and let back after a while.
+//!
+//! A failure alone blames nobody: the tile may be at fault. It is when another worker
+//! has done the tile that the one that failed is known to be.
+
+use alloc::vec::Vec;
+
+use model::{JobId, Timestamp, WorkerId};
+
+use crate::roster::Place;
+use crate::timers::{Alarm, Timer};
+use crate::{Config, Effect, RevokeReason, Sched};
+
+/// Most jobs of which a worker's faults are remembered; the oldest are forgotten.
+const JOBS_REMEMBERED: usize = 16;
+
+/// What a worker is set aside for, and why.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Aside {
+    /// Tiles of a job that it failed and others did.
+    faults: Vec<(JobId, u32)>,
+    /// Jobs of which it gets no tile, and until when.
+    jobs: Vec<(JobId, Timestamp)>,
+    /// Until when it gets no tile at all.
+    farm: Option<Timestamp>,
+    /// When the first of these is over.
+    pub(crate) alarm: Alarm,
+}
+
+/// What another fault of a worker means for it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Verdict {
+    Nothing,
+    AsideForJob,
+}
+
+impl Aside {
+    /// Until when the worker gets no tile at all.
+    pub(crate) fn farm(&self) -> Option<Timestamp> {
+        self.farm
+    }
+
+    /// Until when it gets no tile of a job.
+    pub(crate) fn job(&self, job: JobId) -> Option<Timestamp> {
+        let entry = self.jobs.iter().find(|(of, _)| *of == job);
+        entry.map(|&(_, until)| until)
+    }
+
+    /// The jobs of which it gets no tile.
+    pub(crate) fn jobs(&self) -> impl Iterator<Item = JobId> {
+        self.jobs.iter().map(|&(job, _)| job)
+    }
+
+    fn fails(&mut self, job: JobId, now: Timestamp, config: &Config) -> Verdict {
+        let known = self.faults.iter_mut().find(|(of, _)| *of == job);
+        let faults = match known {
+            Some((_, faults)) => faults,
+            None => {
+                if self.faults.len() >= JOBS_REMEMBERED {
+                    self.faults.remove(0);
+                }
+                self.faults.push((job, 0));
+                let (_, faults) = self.faults.last_mut().expect("it was just added");
+                faults
+            }
+        };
+        *faults += 1;
+        if *faults < config.faults_max || self.job(job).is_some() {
+            return Verdict::Nothing;
+        }
+        self.faults.retain(|&(of, _)| of != job);
+        let until = now + config.aside;
+        self.jobs.push((job, until));
+        if self.jobs.len() >= config.jobs_aside_max as usize {
+            self.farm = Some(until);
+        }
+        Verdict::AsideForJob
+    }
+
+    /// Lets the worker back to what its time is over for; says which jobs those are.
+    fn let_back(&mut self, now: Timestamp) -> Vec<JobId> {
+        let is_over = |until: Timestamp| until <= now;
+        self.farm = self.farm.filter(|&until| !is_over(until));
+        let back = self.jobs.iter().filter(|&&(_, until)| is_over(until));
+        let back = back.map(|&(job, _)| job).collect();
+        self.jobs.retain(|&(_, until)| !is_over(until));
+        back
+    }
+
+    fn next(&self) -> Option<Timestamp> {
+        let jobs = self.jobs.iter().map(|&(_, until)| until);
+        jobs.chain(self.farm).min()
+    }
+}
+
+impl Sched {
+    /// A tile is done at which these workers had failed, by whom that may be.
+    pub(crate) fn blame(
+        &mut self,
+        job: JobId,
+        failed_on: &[WorkerId],
+        done_by: WorkerId,
+        out: &mut Vec<Effect>,
+    ) {
+        let guilty = failed_on.iter().filter(|&&id| id != done_by);
+        let guilty: Vec<Place> = guilty.filter_map(|&id| self.workers.place(id)).collect();
+        for place in guilty {
+            self.is_at_fault(place, job, out);
+        }
+    }
+
+    /// A worker did something wrong for a job that is not the job's fault.
+    pub(crate) fn is_at_fault(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
+        let worker = &mut self.workers[place];
+        if worker.aside.fails(job, self.now, &self.config) == Verdict::Nothing {
+            return;
+        }
+        let next = worker.aside.next();
+        self.timers
+            .set(Timer::LetBack(place), &mut worker.aside.alarm, next);
+        if let Some(job) = self.jobs.get_mut(&job) {
+            job.aside += 1;
+        }
+        self.call_back_ahead(place, Some(job), RevokeReason::CalledBack, out);
+        self.worker_changed(place);
+        self.market.touch(self.workers[place].kinds);
+    }
+
+    /// The time of a worker that was set aside is over.
+    pub(crate) fn let_back(&mut self, place: Place) {
+        let worker = &mut self.workers[place];
+        let back = worker.aside.let_back(self.now);
+        let next = worker.aside.next();
+        self.timers
+            .set(Timer::LetBack(place), &mut worker.aside.alarm, next);
+        for job in back {
+            if let Some(job) = self.jobs.get_mut(&job) {
+                job.aside -= 1;
+            }
+        }
+        self.worker_changed(place);
+        self.market.touch(self.workers[place].kinds);
+    }
+
+    /// Calls back what a worker holds and cannot have started, of one job or of all.
+    pub(crate) fn call_back_ahead(
+        &mut self,
+        place: Place,
+        job: Option<JobId>,
+        reason: RevokeReason,
+        out: &mut Vec<Effect>,
+    ) {
+        let live = self.workers[place].live.clone();
+        let of_job = |number: &u64| job.is_none_or(|job| self.attempts[number].image.job == job);
+        let ahead: Vec<u64> = live
+            .into_iter()
+            .filter(|number| of_job(number) && self.is_ahead(*number))
+            .collect();
+        for number in ahead {
+            self.revoke(number, reason, out);
+        }
+    }
+}

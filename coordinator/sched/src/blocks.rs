@@ -1,0 +1,246 @@
+//! Blocks: what is durable counts, once.
+
+use alloc::vec::Vec;
+
+use model::{Digest, ImageRef, Rect, Span, WorkerId};
+
+use crate::attempt::Attempt;
+use crate::leasing::Purpose;
+use crate::pace::cost_of;
+use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
+
+/// A block that arrived, and what was found about it.
+struct Arrival {
+    block: BlockRef,
+    /// Its tile, while that is leased.
+    tile: Option<u32>,
+    /// Pixels that were not durable before.
+    new: u64,
+    /// Why a block that was durable before was rendered again.
+    purpose: Purpose,
+    elapsed: Span,
+    pixels: Digest,
+}
+
+impl Sched {
+    pub(crate) fn block_stored(
+        &mut self,
+        worker: WorkerId,
+        block: BlockRef,
+        (elapsed, pixels): (Span, Digest),
+        out: &mut Vec<Effect>,
+    ) {
+        self.heard(worker);
+        let BlockRef {
+            attempt,
+            image,
+            rect,
+        } = block;
+        let ack = Effect::Ack {
+            worker,
+            attempt,
+            rect,
+        };
+        let place = match self.place_of_block(block) {
+            Ok(Some(place)) => place,
+            Ok(None) => return out.push(ack),
+            Err(refusal) => {
+                return out.push(Effect::RefuseBlock {
+                    worker,
+                    block,
+                    refusal,
+                });
+            }
+        };
+        let Some(job) = self.jobs.get_mut(&image.job) else {
+            return;
+        };
+        let work = match job.state(place) {
+            // A durable block of an image that nobody had begun: its beginning was in another epoch.
+            ImageState::Waiting => Some(job.begin(place)),
+            _ => job.work.get_mut(&place),
+        };
+        let Some(work) = work else {
+            return;
+        };
+        let new = work.pixels.add(rect);
+        let image_done = work.pixels.is_complete();
+        let tile = work.tile_of(rect);
+        let mut tile_done = false;
+        let mut purpose = Purpose::First;
+        if let Some(tile) = tile.and_then(|tile| work.tiles.get_mut(tile)) {
+            tile.missing -= new;
+            tile_done = tile.missing == 0;
+            if tile.trouble.on_purpose {
+                purpose = Purpose::Second;
+            }
+            if new > 0 {
+                tile.trouble.losses = 0;
+            }
+        }
+        job.tally.pixels_done += new;
+        job.tally.blocks_done += u64::from(new > 0);
+        job.tally.started.get_or_insert(self.now);
+        out.push(ack);
+        let arrival = Arrival {
+            block,
+            tile,
+            new,
+            purpose,
+            elapsed,
+            pixels,
+        };
+        self.credit_attempt(worker, &arrival, out);
+        if let Some(tile) = tile.filter(|_| tile_done) {
+            self.tile_done(image, tile, worker, out);
+        }
+        if image_done && let Some((job, place)) = self.job_and_place(image) {
+            job.work.remove(&place);
+            job.set_state(place, ImageState::Encoding);
+            out.push(Effect::Encode { image });
+        }
+        self.job_changed(image.job);
+    }
+
+    /// The place of the image that a durable block belongs to; `None` where that has all its pixels.
+    fn place_of_block(&self, block: BlockRef) -> Result<Option<u32>, BlockRefusal> {
+        let job = self.jobs.get(&block.image.job);
+        let job = job.ok_or(BlockRefusal::AttemptDead)?;
+        let place = job.place(block.image.image);
+        let place = place.ok_or(BlockRefusal::OtherImage)?;
+        if job.outcome == Some(JobOutcome::Cancelled) {
+            return Err(BlockRefusal::AttemptDead);
+        }
+        match job.state(place) {
+            ImageState::Waiting | ImageState::Rendering => {
+                let fits = block.rect.is_block() && job.spec.window.contains(block.rect);
+                fits.then_some(Some(place)).ok_or(BlockRefusal::NotABlock)
+            }
+            ImageState::Encoding | ImageState::Encoded { .. } if !job.is_over() => Ok(None),
+            _ => Err(BlockRefusal::AttemptDead),
+        }
+    }
+
+    /// Notes with its attempt and worker, where they are there, that a block arrived.
+    /// One that is sent again counts once.
+    fn credit_attempt(&mut self, id: WorkerId, arrival: &Arrival, out: &mut Vec<Effect>) {
+        let BlockRef { image, rect, .. } = arrival.block;
+        let Some(number) = self.owned(id, arrival.block.attempt) else {
+            return;
+        };
+        let Some(attempt) = self.attempts.get_mut(&number) else {
+            return;
+        };
+        let fits = attempt.image == image && Some(attempt.tile) == arrival.tile;
+        if !fits || !attempt.arrives(rect) {
+            return;
+        }
+        // A worker may claim any time; it cannot have taken longer than it had.
+        let elapsed = arrival.elapsed.min(self.now - attempt.leased);
+        let place = attempt.worker;
+        let is_last = attempt.is_delivered();
+        let worker = &mut self.workers[place];
+        worker.blocks += u64::from(arrival.new > 0);
+        worker.pixels += arrival.new;
+        worker.render_time = Span(worker.render_time.0.saturating_add(elapsed.0));
+        let job = self
+            .jobs
+            .get_mut(&image.job)
+            .expect("a live attempt's job is known");
+        if let Some(expected) = job.costs.of_block(rect) {
+            worker.pace.note(expected, elapsed);
+        }
+        let cost = cost_of(elapsed, worker.pace.speed());
+        job.costs.note(rect, cost);
+        let tally = &mut job.tally;
+        tally.render_time = Span(tally.render_time.0.saturating_add(elapsed.0));
+        if arrival.new == 0 {
+            match arrival.purpose {
+                Purpose::First => tally.blocks_again += 1,
+                Purpose::Second => tally.blocks_twice += 1,
+            }
+        }
+        tally.pixels_again += rect.area() - arrival.new;
+        self.worker_changed(place);
+        if !is_last {
+            self.progress(number);
+        }
+        if self.differs(number, rect, arrival.pixels) {
+            self.incident(number, arrival.block, out);
+        }
+    }
+
+    /// Compares a block with what the other attempt at its tile made of it, if that is known.
+    fn differs(&mut self, number: u64, rect: Rect, pixels: Digest) -> bool {
+        let attempt = &self.attempts[&number];
+        let (image, tile) = (attempt.image, attempt.tile);
+        let Some((job, place)) = self.job_and_place(image) else {
+            return false;
+        };
+        let work = job.work.get_mut(&place);
+        let Some(tile) = work.and_then(|work| work.tiles.get_mut(tile)) else {
+            return false;
+        };
+        let seen = tile.seen.iter().find(|(seen, _)| *seen == rect);
+        if let Some((_, digest)) = seen {
+            return *digest != pixels;
+        }
+        // Only while two are at work on it can there be another one to compare it with.
+        if tile.live_count() > 1 {
+            tile.seen.push((rect, pixels));
+        }
+        false
+    }
+
+    /// Two renderings of a block differ. Nobody knows which is right: the one that
+    /// came later ends, its worker gets no more of the job for a while, and somebody is told.
+    fn incident(&mut self, number: u64, block: BlockRef, out: &mut Vec<Effect>) {
+        let attempt = &self.attempts[&number];
+        let (place, tile) = (attempt.worker, attempt.tile);
+        let worker = self.workers[place].id;
+        let mut other = None;
+        if let Some((job, image)) = self.job_and_place(block.image) {
+            job.tally.incidents += 1;
+            let tile = job.work.get(&image).and_then(|work| work.tiles.get(tile));
+            other = tile.and_then(|tile| tile.attempts().find(|&live| live != number));
+        }
+        let other = other.map(|other| self.workers[self.attempts[&other].worker].id);
+        out.push(Effect::Incident {
+            block,
+            worker,
+            other,
+        });
+        self.revoke(number, RevokeReason::Differs, out);
+        self.is_at_fault(place, block.image.job, out);
+    }
+
+    /// Ends the attempts at a tile of which every pixel is durable. One that has
+    /// delivered all it was leased for knows; the others are told.
+    fn tile_done(&mut self, image: ImageRef, tile: u32, by: WorkerId, out: &mut Vec<Effect>) {
+        let Some((job, place)) = self.job_and_place(image) else {
+            return;
+        };
+        let Some(work) = job.work.get_mut(&place) else {
+            return;
+        };
+        let Some(done) = work.tiles.get_mut(tile) else {
+            return;
+        };
+        let failed_on = core::mem::take(&mut done.trouble.failed_on);
+        let live: [Option<u64>; 2] = {
+            let mut attempts = done.attempts();
+            [attempts.next(), attempts.next()]
+        };
+        for number in live.into_iter().flatten() {
+            let attempt = self.attempts.get(&number);
+            if attempt.is_some_and(Attempt::is_delivered) {
+                self.end_attempt(number);
+            } else {
+                self.revoke(number, RevokeReason::TileDone, out);
+            }
+        }
+        if !failed_on.is_empty() {
+            self.blame(image.job, &failed_on, by, out);
+        }
+    }
+}

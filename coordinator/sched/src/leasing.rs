@@ -1,0 +1,237 @@
+//! Who gets the next tile, of which job, and how large.
+
+use alloc::vec::Vec;
+
+use model::{AttemptId, ImageRef, JobId, Lease, Rect, Span, Timestamp};
+
+use crate::attempt::{Attempt, Start};
+use crate::job::Job;
+use crate::market::Stage;
+use crate::needs::{Kind, KindSet};
+use crate::pace::{cost_of, time_of};
+use crate::roster::Place;
+use crate::work::{Amount, Ask};
+use crate::worker::Worker;
+use crate::{Effect, Sched};
+
+/// While pixels are measured but not mapped, a tile by time has at most so many times the pixels
+/// of one of which nothing is known.
+const UNMAPPED_FACTOR: u64 = 4;
+
+/// Why a tile is leased.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Purpose {
+    /// Nobody who can be reached renders it.
+    First,
+    /// Somebody does, and is expected to take long.
+    Second,
+}
+
+impl Sched {
+    /// Leases tiles while a worker wants one that it may have, and helps where jobs are about to end.
+    pub(crate) fn lease_all(&mut self, out: &mut Vec<Effect>) {
+        loop {
+            while let Some(kind) = self.market.touched() {
+                let goes_on = match self.match_kind(kind) {
+                    // Where all that waited turns out to be durable, others of its kind are next.
+                    Some((worker, job)) => {
+                        self.lease(worker, job, out) || !self.may_take(worker, job)
+                    }
+                    None => false,
+                };
+                if !goes_on {
+                    self.market.settled(kind);
+                }
+            }
+            if !self.help_to_end(out) {
+                return;
+            }
+        }
+    }
+
+    /// A worker that serves a kind of which a job has tiles, and the job that its next tile comes from.
+    ///
+    /// Looks at one worker of each group, and at more only where those are set aside or near their end.
+    fn match_kind(&self, kind: Kind) -> Option<(Place, JobId)> {
+        self.market.jobs(Stage::Open, kind).next()?;
+        let groups = self.market.wanting(kind);
+        let first = groups.filter_map(|(kinds, seats)| {
+            seats.iter().find_map(|&seat| {
+                let job = self.next_job(seat.worker, kinds)?;
+                Some((seat, job))
+            })
+        });
+        first.min().map(|(seat, job)| (seat.worker, job))
+    }
+
+    /// The first job in order that has a tile for a worker.
+    pub(crate) fn next_job(&self, worker: Place, kinds: KindSet) -> Option<JobId> {
+        let first = kinds.iter().filter_map(|kind| {
+            let mut jobs = self.market.jobs(Stage::Open, kind);
+            jobs.find(|rank| self.may_take(worker, rank.job))
+        });
+        first.min().map(|rank| rank.job)
+    }
+
+    /// Whether a job has a tile for a worker.
+    pub(crate) fn may_take(&self, worker: Place, job: JobId) -> bool {
+        let (worker, job) = (&self.workers[worker], &self.jobs[&job]);
+        worker.aside.job(job.id).is_none()
+            && self
+                .ask(worker, job)
+                .is_some_and(|ask| job.has_for(&ask, &self.config))
+    }
+
+    /// How large a tile of a job a worker should have; `None` where its time is too short for any.
+    pub(crate) fn ask(&self, worker: &Worker, job: &Job) -> Option<Ask> {
+        let speed = worker.pace.speed();
+        let left = worker.time_left(self.now);
+        let fits = match left {
+            Some(left) if job.costs.mean_square().is_none() => {
+                (left >= self.config.unmeasured_needs).then_some(None)?
+            }
+            Some(left) => {
+                // What is expected is not promised: a fifth is kept back.
+                let cost = cost_of(left, speed) / 5 * 4;
+                let pixels = job.costs.pixels_for(cost).unwrap_or(0);
+                Some(Amount { pixels, cost })
+            }
+            None => None,
+        };
+        let most = job.shape.aim.map(|aim| self.tile_by_time(job, aim, speed));
+        Some(Ask {
+            worker: worker.id,
+            able: self.kinds.able(job.kind).saturating_sub(job.aside),
+            most,
+            fits,
+        })
+    }
+
+    /// A tile that takes `aim` at a speed, or less where a job is near its end.
+    fn tile_by_time(&self, job: &Job, aim: Span, speed: u32) -> Amount {
+        let unknown = self.config.min_tile_pixels;
+        let mut time = aim;
+        let parts = self.config.tail_parts;
+        if let Some(open) = job.open_cost().filter(|_| parts > 0) {
+            let capacity = u32::try_from(self.capacity).unwrap_or(u32::MAX);
+            time = time.min(Span(time_of(open, capacity.max(1)).0 / parts));
+        }
+        let cost = cost_of(time, speed);
+        let pixels = job.costs.pixels_for(cost);
+        Amount {
+            cost,
+            pixels: pixels.map_or(unknown, |pixels| pixels.min(UNMAPPED_FACTOR * unknown)),
+        }
+    }
+
+    /// Leases a worker the next tile of a job, if there still is one.
+    fn lease(&mut self, worker: Place, job_id: JobId, out: &mut Vec<Effect>) -> bool {
+        let ask = self.ask(&self.workers[worker], &self.jobs[&job_id]);
+        let job = self
+            .jobs
+            .get_mut(&job_id)
+            .expect("a job in the market is known");
+        let tile = ask.and_then(|ask| job.take_tile(&ask, &self.config));
+        if let Some((place, tile)) = tile {
+            let image = job.image_ref(place);
+            self.lease_tile(worker, (image, tile), Purpose::First, out);
+        }
+        self.job_changed(job_id);
+        self.settle_job(job_id);
+        tile.is_some()
+    }
+
+    /// Begins an attempt at a tile that has room for one.
+    pub(crate) fn lease_tile(
+        &mut self,
+        place: Place,
+        (image, number): (ImageRef, u32),
+        purpose: Purpose,
+        out: &mut Vec<Effect>,
+    ) {
+        self.attempts_made += 1;
+        let attempt = self.attempts_made;
+        let worker = &mut self.workers[place];
+        let speed = worker.pace.speed();
+        let job = self
+            .jobs
+            .get_mut(&image.job)
+            .expect("a tile's job is known");
+        let index = job.place(image.image).expect("a tile's image is its job's");
+        let work = job
+            .work
+            .get_mut(&index)
+            .expect("a tile's image is in flight");
+        let tile = work
+            .tiles
+            .get(number)
+            .expect("a tile that is leased is there");
+        let mut wanted = work.wanted(tile);
+        let rect = tile.rect;
+        let cost = match wanted.is_empty() {
+            true => job.costs.of_blocks(rect.blocks()),
+            false => job.costs.of_blocks(wanted.iter().copied()),
+        };
+        let blocks = match wanted.len() {
+            0 => rect.blocks().count(),
+            some => some,
+        };
+        if purpose == Purpose::Second {
+            // From the other end: the two attempts meet.
+            if wanted.is_empty() {
+                wanted = rect.blocks().collect::<Vec<Rect>>();
+            }
+            wanted.reverse();
+            job.tally.seconds += 1;
+        }
+        let tile = work.tiles.get_mut(number).expect("it was just there");
+        tile.begins(attempt);
+        tile.trouble.on_purpose |= purpose == Purpose::Second;
+        let failures = tile.trouble.failures;
+        job.tally.attempts_live += 1;
+        job.tally.started.get_or_insert(self.now);
+        let block_cost = cost.unwrap_or(0) / blocks.max(1) as u64;
+        let limit = job.block_limit(&self.config, (block_cost, speed), failures);
+        let expected = cost.map(|cost| time_of(cost, speed));
+        let finish = expected.map(|expected| worker.begins_next(self.now) + expected);
+        let lease = Lease {
+            attempt: AttemptId {
+                epoch: self.config.epoch,
+                number: attempt,
+            },
+            image,
+            scene: job.spec.scene,
+            tile: rect,
+            wanted,
+            expected: expected.unwrap_or_default(),
+        };
+        let start = Start {
+            worker: place,
+            image,
+            tile: number,
+            rect,
+            leased: self.now,
+            wanted: u32::try_from(blocks).unwrap_or(u32::MAX),
+            cost: cost.unwrap_or(0),
+            // Nobody knows: it is looked at first, and expected anew.
+            finish: finish.unwrap_or(Timestamp(u64::MAX)),
+            limit,
+        };
+        self.attempts.insert(attempt, Attempt::new(start));
+
+        if worker.live.is_empty() {
+            worker.moved = self.now;
+        }
+        worker.live.push(attempt);
+        worker.idle += 1;
+        worker.backlog = worker.backlog.saturating_add(cost.unwrap_or(0));
+        worker.patience = limit;
+        let id = worker.id;
+        if worker.waiting.due().is_none() {
+            self.rearm_waiting(place);
+        }
+        self.worker_changed(place);
+        self.reconsider(image, number);
+        out.push(Effect::Lease { worker: id, lease });
+    }
+}

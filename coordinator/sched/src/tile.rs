@@ -1,0 +1,129 @@
+//! A tile: a part of an image that is leased, and what is known against it.
+
+use alloc::vec::Vec;
+
+use model::{Digest, Rect, WorkerId};
+
+use crate::region::Region;
+
+/// Most live attempts of one tile.
+pub(crate) const LIVE_MAX: usize = 2;
+
+/// What is kept of a tile from its first lease until it is done or waits again.
+#[derive(Clone, Debug)]
+pub(crate) struct Tile {
+    pub(crate) region: Region,
+    pub(crate) rect: Rect,
+    /// Pixels that are not durable.
+    pub(crate) missing: u64,
+    pub(crate) trouble: Trouble,
+    live: [Option<u64>; LIVE_MAX],
+    /// Blocks that arrived since it was leased a second time, and the digest of their pixels.
+    pub(crate) seen: Vec<(Rect, Digest)>,
+}
+
+/// What went wrong with some pixels; it stays with them however they are cut.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Trouble {
+    /// Attempts that failed or got stuck.
+    pub(crate) failures: u32,
+    /// Attempts that ran on a worker that was then lost, since a pixel was last made durable.
+    pub(crate) losses: u32,
+    /// It was leased a second time on purpose, or called back: what is rendered twice is no failure's fault.
+    pub(crate) on_purpose: bool,
+    /// The workers of those that failed, each once.
+    pub(crate) failed_on: Vec<WorkerId>,
+}
+
+impl Tile {
+    pub(crate) fn new(region: Region, rect: Rect, missing: u64, trouble: Trouble) -> Self {
+        Self {
+            region,
+            rect,
+            missing,
+            trouble,
+            live: [None; LIVE_MAX],
+            seen: Vec::new(),
+        }
+    }
+
+    /// Live attempts.
+    pub(crate) fn attempts(&self) -> impl Iterator<Item = u64> + use<> {
+        self.live.into_iter().flatten()
+    }
+
+    pub(crate) fn live_count(&self) -> usize {
+        self.attempts().count()
+    }
+
+    pub(crate) fn begins(&mut self, attempt: u64) {
+        let slot = self.live.iter_mut().find(|slot| slot.is_none());
+        *slot.expect("a tile is leased only while it has room for an attempt") = Some(attempt);
+    }
+
+    pub(crate) fn ends(&mut self, attempt: u64) {
+        for slot in &mut self.live {
+            if *slot == Some(attempt) {
+                *slot = None;
+            }
+        }
+    }
+}
+
+impl Trouble {
+    /// Notes an attempt that failed on a worker.
+    pub(crate) fn fails(&mut self, worker: WorkerId) {
+        self.failures += 1;
+        if !self.failed_on.contains(&worker) {
+            self.failed_on.push(worker);
+        }
+    }
+
+    /// Whether a worker should be given these pixels, of `able` workers that there are: one that
+    /// failed at them comes last.
+    pub(crate) fn suits(&self, worker: WorkerId, able: u32) -> bool {
+        self.failed_on.len() >= able as usize || !self.failed_on.contains(&worker)
+    }
+}
+
+/// Tiles by number; a number is given anew once its tile is gone.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tiles {
+    rows: Vec<Option<Tile>>,
+    free: Vec<u32>,
+}
+
+impl Tiles {
+    pub(crate) fn get(&self, number: u32) -> Option<&Tile> {
+        self.rows.get(number as usize)?.as_ref()
+    }
+
+    pub(crate) fn get_mut(&mut self, number: u32) -> Option<&mut Tile> {
+        self.rows.get_mut(number as usize)?.as_mut()
+    }
+
+    pub(crate) fn insert(&mut self, tile: Tile) -> u32 {
+        match self.free.pop() {
+            Some(number) => {
+                self.rows[number as usize] = Some(tile);
+                number
+            }
+            None => {
+                self.rows.push(Some(tile));
+                u32::try_from(self.rows.len() - 1).expect("tiles are limited")
+            }
+        }
+    }
+
+    pub(crate) fn remove(&mut self, number: u32) -> Option<Tile> {
+        let tile = self.rows.get_mut(number as usize)?.take()?;
+        self.free.push(number);
+        Some(tile)
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, &Tile)> {
+        (0..)
+            .zip(&self.rows)
+            .filter_map(|(number, row)| Some((number, row.as_ref()?)))
+    }
+}
