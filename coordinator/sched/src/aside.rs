@@ -1,7 +1,8 @@
 //! Workers that fail where others succeed are set aside, and let back after a while.
 //!
 //! A failure alone blames nobody: the tile may be at fault. It is when another worker
-//! has done the tile that the one that failed is known to be.
+//! has done the tile that the one that failed is known to be. A tile that it does itself
+//! clears it: only faults in a row tell a broken worker from bad luck.
 
 use alloc::vec::Vec;
 
@@ -17,7 +18,7 @@ const JOBS_REMEMBERED: usize = 16;
 /// What a worker is set aside for, and why.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Aside {
-    /// Tiles of a job that it failed and others did.
+    /// Tiles of a job that it failed and others did, since it did one itself.
     faults: Vec<(JobId, u32)>,
     /// Jobs of which it gets no tile, and until when.
     jobs: Vec<(JobId, Timestamp)>,
@@ -77,6 +78,11 @@ impl Aside {
         Verdict::AsideForJob
     }
 
+    /// The worker did a tile of a job.
+    fn succeeds(&mut self, job: JobId) {
+        self.faults.retain(|&(of, _)| of != job);
+    }
+
     /// Lets the worker back to what its time is over for; says which jobs those are.
     fn let_back(&mut self, now: Timestamp) -> Vec<JobId> {
         let is_over = |until: Timestamp| until <= now;
@@ -106,6 +112,13 @@ impl Sched {
         let guilty: Vec<Place> = guilty.filter_map(|&id| self.workers.place(id)).collect();
         for place in guilty {
             self.is_at_fault(place, job, out);
+        }
+    }
+
+    /// A worker did a tile.
+    pub(crate) fn clear(&mut self, id: WorkerId, job: JobId) {
+        if let Some(place) = self.workers.place(id) {
+            self.workers[place].aside.succeeds(job);
         }
     }
 

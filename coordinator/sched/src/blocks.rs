@@ -239,6 +239,7 @@ impl Sched {
                 self.revoke(number, RevokeReason::TileDone, out);
             }
         }
+        self.clear(by, image.job);
         if !failed_on.is_empty() {
             self.blame(image.job, &failed_on, by, out);
         }

@@ -38,7 +38,7 @@ pub struct Config {
     /// A tile is leased a second time, or called back for another worker, only where
     /// that is expected to gain so much.
     pub tail_gain: TailGain,
-    /// A worker that failed so many tiles of a job at which others then succeeded is set aside for that job…
+    /// A worker that failed so many tiles of a job in a row at which others then succeeded is set aside for that job…
     pub faults_max: u32,
     /// …and for the farm where it is set aside for so many jobs.
     pub jobs_aside_max: u32,
@@ -115,7 +115,7 @@ impl Config {
                 call_back: Some(Span::from_millis(500)),
                 second: Some(Span::from_millis(500)),
             },
-            faults_max: 2,
+            faults_max: 3,
             jobs_aside_max: 2,
             aside: Span::from_secs(300),
             unmeasured_needs: Span::from_secs(30),

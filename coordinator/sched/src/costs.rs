@@ -163,7 +163,11 @@ impl CostMap {
 
 /// `value · part / whole`, without overflow; the largest number where it does not fit.
 pub(crate) fn scale(value: u64, part: u64, whole: u64) -> u64 {
-    let scaled = u128::from(value) * u128::from(part) / u128::from(whole.max(1));
+    let whole = whole.max(1);
+    if let Some(product) = value.checked_mul(part) {
+        return product / whole;
+    }
+    let scaled = u128::from(value) * u128::from(part) / u128::from(whole);
     u64::try_from(scaled).unwrap_or(u64::MAX)
 }
 

@@ -190,7 +190,9 @@ impl Sched {
                 continue;
             }
             for (place, worker) in self.workers.iter() {
-                let wants = worker.seat.is_some() && worker.kinds.contains(job.kind);
+                // Of those whose time is limited only the first few are looked at.
+                let is_limited = worker.ends.is_some();
+                let wants = worker.seat.is_some() && worker.kinds.contains(job.kind) && !is_limited;
                 assert!(
                     !wants || !self.may_take(place, *id),
                     "what can be leased is"

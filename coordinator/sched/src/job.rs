@@ -170,6 +170,11 @@ impl Job {
         self.waiting.contains(place)
     }
 
+    /// The image that is begun next.
+    pub(crate) fn first_waiting(&self) -> Option<u32> {
+        self.waiting.first()
+    }
+
     /// Where it belongs in the market.
     pub(crate) fn stands(&self, config: &Config) -> Option<(Stage, Rank)> {
         let stage = if !self.goes_on() {

@@ -18,6 +18,10 @@ use crate::{Effect, Sched};
 /// of one of which nothing is known.
 const UNMAPPED_FACTOR: u64 = 4;
 
+/// Workers of one group that are looked at for a tile. Of those that are alike, a tile suits all
+/// but those that failed at it, which are fewer than this before its image fails.
+const SEATS_LOOKED_AT: usize = 8;
+
 /// Why a tile is leased.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Purpose {
@@ -51,12 +55,12 @@ impl Sched {
 
     /// A worker that serves a kind of which a job has tiles, and the job that its next tile comes from.
     ///
-    /// Looks at one worker of each group, and at more only where those are set aside or near their end.
+    /// Looks at the first few workers of each group: where none of them finds a job, none of the group does.
     fn match_kind(&self, kind: Kind) -> Option<(Place, JobId)> {
         self.market.jobs(Stage::Open, kind).next()?;
         let groups = self.market.wanting(kind);
         let first = groups.filter_map(|(kinds, seats)| {
-            seats.iter().find_map(|&seat| {
+            seats.iter().take(SEATS_LOOKED_AT).find_map(|&seat| {
                 let job = self.next_job(seat.worker, kinds)?;
                 Some((seat, job))
             })

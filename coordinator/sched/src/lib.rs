@@ -45,6 +45,7 @@ mod tile;
 mod tiling;
 mod timers;
 mod view;
+mod why;
 mod work;
 mod worker;
 
@@ -58,3 +59,4 @@ pub use sched::Sched;
 pub use view::{
     ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused, WorkerView,
 };
+pub use why::{WhyImage, WhyJob, WhyTile, WhyWorker};

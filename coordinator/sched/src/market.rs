@@ -6,7 +6,7 @@ use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-use model::JobId;
+use model::{JobId, Timestamp};
 
 use crate::needs::{Kind, KindSet};
 use crate::roster::Place;
@@ -14,19 +14,33 @@ use crate::roster::Place;
 /// Workers that want tiles and jobs that have some, by the kind of job.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Market {
-    /// Workers that serve the same kinds together, the least loaded first.
-    wanting: BTreeMap<KindSet, BTreeSet<Seat>>,
+    /// Workers for which the same jobs are to be had, the least loaded first.
+    wanting: BTreeMap<Group, BTreeSet<Seat>>,
     /// Jobs with tiles that wait for a worker, by kind, in the order in which they are served.
     open: Vec<BTreeSet<Rank>>,
     /// Jobs of which every tile is leased and not every tile is done, in the same way.
     ending: Vec<BTreeSet<Rank>>,
     /// Kinds where somebody came in since the last time nothing was left to match.
     touched: KindSet,
+    /// Whether a worker came or moved since somebody last asked.
+    came: bool,
 }
 
-/// Where a worker stands among those that want tiles.
+/// Workers that are alike: where one of them finds no job, the others need not look.
+#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+pub(crate) struct Group {
+    pub(crate) kinds: KindSet,
+    /// A job that they are set aside for.
+    pub(crate) aside: Option<JobId>,
+    /// Whether their time is limited.
+    pub(crate) is_limited: bool,
+}
+
+/// Where a worker stands among those of its group that want tiles.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct Seat {
+    /// Where their time is limited, whoever has most of it first: what does not fit there fits nobody.
+    ends: Reverse<Timestamp>,
     /// Tiles held per thread, times 1,024.
     load: u64,
     /// Of those that are loaded alike, the fastest first.
@@ -53,8 +67,14 @@ pub(crate) enum Stage {
 }
 
 impl Seat {
-    pub(crate) fn new(held: usize, threads: u32, speed: u32, worker: Place) -> Self {
+    pub(crate) fn new(
+        ends: Option<Timestamp>,
+        (held, threads): (usize, u32),
+        speed: u32,
+        worker: Place,
+    ) -> Self {
         Self {
+            ends: Reverse(ends.unwrap_or_default()),
             load: held as u64 * 1_024 / u64::from(threads.max(1)),
             speed: Reverse(speed),
             worker,
@@ -81,23 +101,24 @@ impl Market {
     /// Puts a worker where it now belongs; `slot` is where it stood.
     pub(crate) fn place_worker(
         &mut self,
-        slot: &mut Option<(KindSet, Seat)>,
-        seat: Option<(KindSet, Seat)>,
+        slot: &mut Option<(Group, Seat)>,
+        seat: Option<(Group, Seat)>,
     ) {
         if *slot == seat {
             return;
         }
-        if let Some((kinds, old)) = *slot
-            && let Some(seats) = self.wanting.get_mut(&kinds)
+        if let Some((group, old)) = *slot
+            && let Some(seats) = self.wanting.get_mut(&group)
         {
             seats.remove(&old);
             if seats.is_empty() {
-                self.wanting.remove(&kinds);
+                self.wanting.remove(&group);
             }
         }
-        if let Some((kinds, new)) = seat {
-            self.wanting.entry(kinds).or_default().insert(new);
-            self.touched.add(kinds);
+        if let Some((group, new)) = seat {
+            self.wanting.entry(group).or_default().insert(new);
+            self.touched.add(group.kinds);
+            self.came = true;
         }
         *slot = seat;
     }
@@ -119,6 +140,11 @@ impl Market {
             self.ranks(stage, kind).insert(rank);
         }
         *slot = place;
+    }
+
+    /// Whether a worker came or moved since this was last asked.
+    pub(crate) fn take_came(&mut self) -> bool {
+        core::mem::take(&mut self.came)
     }
 
     /// Something of these kinds may be leased that was not before.
@@ -143,14 +169,14 @@ impl Market {
 
     /// Workers that want tiles and serve a kind, each group in order.
     pub(crate) fn wanting(&self, kind: Kind) -> impl Iterator<Item = (KindSet, &BTreeSet<Seat>)> {
-        let serves = move |kinds: &KindSet| kinds.contains(kind);
-        let groups = self.wanting.iter().filter(move |(kinds, _)| serves(kinds));
-        groups.map(|(&kinds, seats)| (kinds, seats))
+        self.groups().filter(move |(kinds, _)| kinds.contains(kind))
     }
 
     /// All workers that want tiles, in groups.
     pub(crate) fn groups(&self) -> impl Iterator<Item = (KindSet, &BTreeSet<Seat>)> {
-        self.wanting.iter().map(|(&kinds, seats)| (kinds, seats))
+        self.wanting
+            .iter()
+            .map(|(group, seats)| (group.kinds, seats))
     }
 
     /// The jobs of a kind in a stage, in order.

@@ -43,6 +43,8 @@ pub struct Sched {
     pub(crate) attempts_made: u64,
     pub(crate) timers: Timers,
     pub(crate) market: Market,
+    /// When it is worth looking again for help that jobs near their end could have.
+    pub(crate) help_next: Timestamp,
     /// Jobs that this event changed.
     pub(crate) changed: BTreeSet<JobId>,
 }
@@ -66,6 +68,7 @@ impl Sched {
             attempts_made: 0,
             timers: Timers::default(),
             market: Market::default(),
+            help_next: Timestamp::default(),
             changed: BTreeSet::new(),
         }
     }

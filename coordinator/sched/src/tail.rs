@@ -27,6 +27,9 @@ const WORKERS_LOOKED_AT: usize = 4;
 const JOBS_LOOKED_AT: usize = 4;
 const ATTEMPTS_LOOKED_AT: usize = 8;
 
+/// After how long it is worth looking again where nobody came.
+const LOOK_AGAIN: Span = Span::from_millis(50);
+
 /// Of what is left to wait for, the part that help must gain.
 const GAIN_PART: u64 = 8;
 
@@ -40,9 +43,11 @@ enum Help {
 impl Sched {
     /// Gives one idle worker something to do for a job of which every tile is leased; says whether it did.
     pub(crate) fn help_to_end(&mut self, out: &mut Vec<Effect>) -> bool {
-        if !self.market.has(Stage::Ending) {
+        let is_worth_it = self.market.take_came() || self.help_next <= self.now;
+        if !is_worth_it || !self.market.has(Stage::Ending) {
             return false;
         }
+        self.help_next = self.now + LOOK_AGAIN;
         let mut idle: Vec<(KindSet, Place)> = Vec::new();
         for (kinds, seats) in self.market.groups() {
             let seats = seats.iter().take_while(|seat| seat.has_free_thread());
@@ -84,6 +89,7 @@ impl Sched {
             Help::Second => self.lease_tile(place, (image, tile), Purpose::Second, out),
         }
         self.settle_job(id);
+        self.help_next = self.now;
         true
     }
 

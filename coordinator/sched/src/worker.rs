@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 use model::{Span, Timestamp, WorkerId};
 
 use crate::aside::Aside;
-use crate::market::Seat;
+use crate::market::{Group, Seat};
 use crate::needs::KindSet;
 use crate::pace::{Pace, cost_of, time_of};
 use crate::roster::Place;
@@ -47,7 +47,7 @@ pub(crate) struct Worker {
     /// When what it holds counts as forgotten; due while it holds something and renders nothing.
     pub(crate) waiting: Alarm,
     /// Where it stands in the market; `None` while it wants no tile.
-    pub(crate) seat: Option<(KindSet, Seat)>,
+    pub(crate) seat: Option<(Group, Seat)>,
     /// The kinds under which it is counted as able, and what it adds to the farm's capacity.
     pub(crate) counted: Option<(KindSet, u64)>,
 }
@@ -98,16 +98,21 @@ impl Worker {
     }
 
     /// Where it belongs in the market.
-    pub(crate) fn wants(&self, place: Place) -> Option<(KindSet, Seat)> {
+    pub(crate) fn wants(&self, place: Place) -> Option<(Group, Seat)> {
         let wants = self.is_able() && self.live.len() < self.credit as usize;
         wants.then(|| {
             let seat = Seat::new(
-                self.live.len(),
-                self.offer.threads,
+                self.ends,
+                (self.live.len(), self.offer.threads),
                 self.pace.speed(),
                 place,
             );
-            (self.kinds, seat)
+            let group = Group {
+                kinds: self.kinds,
+                aside: self.aside.jobs().next(),
+                is_limited: self.ends.is_some(),
+            };
+            (group, seat)
         })
     }
 

@@ -49,7 +49,10 @@ fn fails_where_another_succeeds(farm: &mut Farm) {
 }
 
 fn two_workers() -> Farm {
-    let mut farm = farm();
+    let mut farm = Farm::new(Config {
+        faults_max: 2,
+        ..Config::new(EPOCH)
+    });
     farm.worker(1, 0).worker(2, 0);
     submits(&mut farm, 1);
     farm
