@@ -52,7 +52,7 @@ struct Worker {
     #[arg(long, value_name = "N", value_parser = values::at_least_one)]
     threads: Option<usize>,
 
-    /// Tiles to hold beyond those that are rendered [default: one for each thread].
+    /// Tiles to hold beyond those that are rendered [default: as many as it takes that no thread waits].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(..=4096))]
     ahead: Option<u32>,
 

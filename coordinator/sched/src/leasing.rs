@@ -102,24 +102,33 @@ impl Sched {
             }
             None => None,
         };
-        let most = job.shape.aim.map(|aim| self.tile_by_time(job, aim, speed));
+        let left = job
+            .open_cost()
+            .map(|cost| time_of(cost, self.total_speed()));
+        let most = job
+            .shape
+            .aim
+            .map(|aim| self.tile_by_time(job, (aim, left), speed));
         Some(Ask {
             worker: worker.id,
             able: self.kinds.able(job.kind).saturating_sub(job.aside),
             most,
             fits,
+            lasts: left.map(|left| cost_of(left + self.config.tile_time, speed)),
         })
     }
 
-    /// A tile that takes `aim` at a speed, or less where a job is near its end.
-    fn tile_by_time(&self, job: &Job, aim: Span, speed: u32) -> Amount {
+    /// The speed of all threads of workers that take tiles.
+    fn total_speed(&self) -> u32 {
+        u32::try_from(self.capacity).unwrap_or(u32::MAX).max(1)
+    }
+
+    /// A tile that takes `aim` at a speed, or less where a job of which so much is left is near its end.
+    fn tile_by_time(&self, job: &Job, (aim, left): (Span, Option<Span>), speed: u32) -> Amount {
         let unknown = self.config.min_tile_pixels;
-        let mut time = aim;
         let parts = self.config.tail_parts;
-        if let Some(open) = job.open_cost().filter(|_| parts > 0) {
-            let capacity = u32::try_from(self.capacity).unwrap_or(u32::MAX);
-            time = time.min(Span(time_of(open, capacity.max(1)).0 / parts));
-        }
+        let most = left.filter(|_| parts > 0).map(|left| Span(left.0 / parts));
+        let time = most.map_or(aim, |most| aim.min(most));
         let cost = cost_of(time, speed);
         let pixels = job.costs.pixels_for(cost);
         Amount {

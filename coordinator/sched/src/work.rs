@@ -74,6 +74,8 @@ pub(crate) struct Ask {
     pub(crate) most: Option<Amount>,
     /// A tile is not larger than this, in the time that the worker has left.
     pub(crate) fits: Option<Amount>,
+    /// What costs more than this, others had better begin: here it would be done after all else.
+    pub(crate) lasts: Option<u64>,
 }
 
 impl Work {
@@ -136,6 +138,7 @@ impl Work {
                 self.shared.remove(&tile);
                 return Some(tile);
             }
+            let cheap = self.wants_cheap(ask);
             let piece = match self.troubled_for(ask) {
                 Some(index) => self.troubled.remove(index),
                 None => {
@@ -146,7 +149,7 @@ impl Work {
             let amount = self.amount(piece.region);
             self.open.pixels -= amount.pixels;
             self.open.cost -= amount.cost;
-            let piece = self.cut(piece, ask);
+            let piece = self.cut(piece, ask, cheap);
             // What other attempts delivered late is not rendered again.
             let rect = piece.region.rect(self.grid);
             let missing = self.missing(rect);
@@ -175,13 +178,23 @@ impl Work {
         })
     }
 
-    /// A worker that has time enough gets the first piece; one that is near its end the cheapest.
+    /// A worker that has time enough gets the first piece, others the cheapest.
     fn piece_for(&self, ask: &Ask) -> Option<Order> {
-        let (&order, piece) = match ask.fits {
-            None => return self.pieces.first_key_value().map(|(&order, _)| order),
-            Some(_) => self.pieces.last_key_value()?,
-        };
+        if !self.wants_cheap(ask) {
+            return self.pieces.first_key_value().map(|(&order, _)| order);
+        }
+        let (&order, piece) = self.pieces.last_key_value()?;
         self.fits_smallest(piece.region, ask).then_some(order)
+    }
+
+    /// Whether a worker is near its end, or so slow that the dearest cell would keep it for longer
+    /// than the job still takes.
+    fn wants_cheap(&self, ask: &Ask) -> bool {
+        let lasts = |most: u64| {
+            let first = self.pieces.first_key_value();
+            first.is_some_and(|(order, _)| u64::from(order.1.0) > most)
+        };
+        ask.fits.is_some() || ask.lasts.is_some_and(lasts)
     }
 
     /// Whether the last cell that a piece is cut down to fits.
@@ -190,7 +203,7 @@ impl Work {
             return true;
         }
         while let Some((first, second)) = region.split() {
-            region = self.choose(first, second, ask).0;
+            region = self.choose(first, second, true).0;
         }
         self.fits(region, ask)
     }
@@ -200,7 +213,7 @@ impl Work {
     }
 
     /// Cuts a piece down to what is asked for; the rest waits on.
-    fn cut(&mut self, mut piece: Piece, ask: &Ask) -> Piece {
+    fn cut(&mut self, mut piece: Piece, ask: &Ask, cheap: bool) -> Piece {
         loop {
             let is_large = ask.most.is_none_or(|most| self.exceeds(piece.region, most))
                 || !self.fits(piece.region, ask);
@@ -208,7 +221,7 @@ impl Work {
             let Some((first, second)) = halves else {
                 return piece;
             };
-            let (taken, left) = self.choose(first, second, ask);
+            let (taken, left) = self.choose(first, second, cheap);
             self.put(Piece {
                 region: left,
                 trouble: piece.trouble.clone(),
@@ -217,10 +230,10 @@ impl Work {
         }
     }
 
-    /// Of two halves the one that goes to this worker, and the other.
-    fn choose(&self, first: Region, second: Region, ask: &Ask) -> (Region, Region) {
+    /// Of two halves the one that is taken, and the other.
+    fn choose(&self, first: Region, second: Region, cheap: bool) -> (Region, Region) {
         let in_order = self.order(first) <= self.order(second);
-        match in_order == ask.fits.is_none() {
+        match in_order != cheap {
             true => (first, second),
             false => (second, first),
         }

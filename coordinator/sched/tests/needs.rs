@@ -29,7 +29,7 @@ fn asks(farm: &mut Farm, needs: Needs) {
 }
 
 fn held(farm: &Farm, id: u64) -> u32 {
-    farm.sched.worker(worker(id)).unwrap().attempts
+    farm.sched.worker(worker(id)).expect("it joined").attempts
 }
 
 #[test]

@@ -18,7 +18,7 @@ pub struct Config {
     pub name: String,
     /// Render threads; each renders one tile at a time.
     pub threads: NonZeroU32,
-    /// Tiles held beyond those; `None`: as many as threads.
+    /// Tiles held beyond those; `None`: as many as it takes that no thread waits.
     pub ahead: Option<u32>,
     /// Where its id and the assets it fetched are kept; `None`: nowhere.
     pub state: Option<PathBuf>,

@@ -92,7 +92,10 @@ impl Shell {
     ) -> Result<Self, RunError> {
         let threads = config.threads.get();
         let mut settings = session::Config::new(threads);
-        settings.ahead = config.ahead.unwrap_or(settings.ahead);
+        if let Some(ahead) = config.ahead {
+            // What was asked for holds, whatever is measured.
+            (settings.ahead, settings.ahead_least, settings.ahead_max) = (ahead, ahead, ahead);
+        }
         settings.backoff.key = identity::draw()?;
         let images_max = (threads as usize).saturating_add(IMAGES_AHEAD);
         let images = Images::new(painter.clone(), images_max);

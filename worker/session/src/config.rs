@@ -9,8 +9,13 @@ use crate::Backoff;
 pub struct Config {
     /// Tiles rendered at a time, one thread each; at least 1 counts.
     pub threads: u32,
-    /// Tiles held beyond those, so that no thread waits for a round trip (thesis C.3.5).
+    /// Tiles held beyond those, so that no thread waits for a round trip (thesis C.3.5), until it is
+    /// measured how many that takes.
     pub ahead: u32,
+    /// Fewest tiles held ahead, whatever is measured…
+    pub ahead_least: u32,
+    /// …and most.
+    pub ahead_max: u32,
     /// Most blocks that are rendered but not yet acknowledged; more than `threads` count.
     /// One is at most 32 KiB of pixels in the shell's memory.
     pub unacked_blocks_max: u32,
@@ -33,6 +38,8 @@ impl Config {
         Self {
             threads,
             ahead: threads,
+            ahead_least: 1,
+            ahead_max: threads.saturating_mul(16).clamp(64, 512),
             unacked_blocks_max: threads.saturating_mul(16).max(1_024),
             backoff: Backoff::default(),
             connect_limit: Span::from_secs(10),

@@ -3,12 +3,14 @@
 use alloc::collections::VecDeque;
 use alloc::string::String;
 
-use model::{Lease, Rect};
+use model::{Lease, Rect, Timestamp};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
     pub(crate) lease: Lease,
     pub(crate) phase: Phase,
+    /// When a thread began it.
+    pub(crate) started: Timestamp,
     /// Blocks rendered so far.
     pub(crate) rendered: u32,
     /// Blocks rendered and not acknowledged, in the order in which they were rendered.
@@ -35,6 +37,7 @@ impl Held {
         Self {
             lease,
             phase: Phase::Waiting,
+            started: Timestamp::default(),
             rendered: 0,
             unacked: VecDeque::new(),
         }

@@ -62,9 +62,7 @@ impl Session {
         let attempts: Vec<AttemptId> = self.waiting.iter().copied().collect();
         self.forget_waiting();
         if self.link.is_up() {
-            out.push(Effect::SendCredit {
-                credit: self.credit(),
-            });
+            self.send_credit(out);
             if !attempts.is_empty() {
                 out.push(Effect::GiveBack { attempts });
             }

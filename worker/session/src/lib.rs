@@ -13,6 +13,7 @@
 
 extern crate alloc;
 
+mod ahead;
 mod backoff;
 mod config;
 mod effect;

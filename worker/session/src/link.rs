@@ -101,9 +101,7 @@ impl Session {
         self.coordinator.away_since = None;
         // Another epoch numbers its attempts anew.
         self.newest = self.newest.filter(|newest| newest.epoch == welcome.epoch);
-        out.push(Effect::SendCredit {
-            credit: self.credit(),
-        });
+        self.send_credit(out);
         self.reconcile(&welcome, out);
         self.resend_all(out);
     }
@@ -141,6 +139,7 @@ impl Session {
         };
         // All that is kept is sent again on the next link.
         self.resends.clear();
+        self.ahead.forgets();
         if let Leaving::Stopping { .. } = self.leaving {
             self.exit(ExitReason::Stopped, out);
         }
@@ -203,5 +202,8 @@ impl Session {
             })
             .collect();
         out.push(Effect::SendHeartbeat { running });
+        if self.credit() != self.credit_told {
+            self.send_credit(out);
+        }
     }
 }

@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, Rect, Timestamp};
 
+use crate::ahead::Ahead;
 use crate::held::{Held, Phase};
 use crate::leave::Leaving;
 use crate::link::{Coordinator, Link};
@@ -31,6 +32,9 @@ pub struct Session {
     /// Blocks to send again, and when.
     pub(crate) resends: BTreeSet<(Timestamp, AttemptId, Rect)>,
     pub(crate) paused: bool,
+    pub(crate) ahead: Ahead,
+    /// The credit that the coordinator was told last.
+    pub(crate) credit_told: u32,
     pub(crate) leaving: Leaving,
     pub(crate) tiles_delivered: u64,
     pub(crate) blocks_acked: u64,
@@ -85,6 +89,8 @@ impl Session {
             unacked: 0,
             resends: BTreeSet::new(),
             paused: false,
+            ahead: Ahead::default(),
+            credit_told: 0,
             leaving: Leaving::No,
             tiles_delivered: 0,
             blocks_acked: 0,

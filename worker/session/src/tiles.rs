@@ -13,9 +13,27 @@ impl Session {
     /// How many tiles the worker wants to hold in all (thesis C.3.5).
     pub(crate) fn credit(&self) -> u32 {
         match self.leaving {
-            Leaving::No => self.config.threads.saturating_add(self.config.ahead),
+            Leaving::No => self.config.threads.saturating_add(self.ahead()),
             _ => 0,
         }
+    }
+
+    /// How many of them it does not render.
+    fn ahead(&self) -> u32 {
+        match self.ahead.tiles(self.config.threads) {
+            Some(tiles) => u32::try_from(tiles)
+                .unwrap_or(u32::MAX)
+                .max(self.config.ahead_least)
+                .min(self.config.ahead_max),
+            None => self.config.ahead,
+        }
+    }
+
+    pub(crate) fn send_credit(&mut self, out: &mut Vec<Effect>) {
+        self.credit_told = self.credit();
+        out.push(Effect::SendCredit {
+            credit: self.credit_told,
+        });
     }
 
     pub(crate) fn leased(&mut self, lease: Lease, out: &mut Vec<Effect>) {
@@ -44,6 +62,7 @@ impl Session {
             };
             if let Some(held) = self.held.get_mut(&attempt) {
                 held.phase = Phase::Running;
+                held.started = self.now;
                 self.running += 1;
                 let lease = held.lease.clone();
                 out.push(Effect::StartTile { lease });
@@ -58,6 +77,7 @@ impl Session {
         if held.renders(rect) {
             self.unacked += 1;
             if self.link.is_up() {
+                self.ahead.sends(attempt, rect, self.now);
                 out.push(Effect::SendBlock { attempt, rect });
             }
             self.press_back(out);
@@ -69,6 +89,9 @@ impl Session {
         if let Some(held) = self.held.get_mut(&attempt)
             && held.phase == Phase::Running
         {
+            if phase == Phase::Rendered {
+                self.ahead.renders(self.now - held.started);
+            }
             held.phase = phase;
             self.running -= 1;
             self.settle(attempt, out);
@@ -79,6 +102,7 @@ impl Session {
         if let Some(held) = self.held.get_mut(&attempt)
             && held.answers(rect)
         {
+            self.ahead.hears(attempt, rect, self.now);
             self.blocks_acked += 1;
             self.unacked -= 1;
             out.push(Effect::DropBlock { attempt, rect });
@@ -94,6 +118,7 @@ impl Session {
         verdict: BlockVerdict,
         out: &mut Vec<Effect>,
     ) {
+        self.ahead.forgets();
         let Some(held) = self.held.get_mut(&attempt) else {
             return;
         };
@@ -166,6 +191,7 @@ impl Session {
             return;
         };
         self.waiting.remove(&attempt);
+        self.ahead.forgets();
         if held.phase == Phase::Running {
             self.running -= 1;
             out.push(Effect::CancelTile { attempt });

@@ -1,5 +1,10 @@
 //! A worker in a situation, told in few words.
 
+#![allow(
+    dead_code,
+    reason = "each test program uses its own part of the language"
+)]
+
 use model::{AttemptId, Digest, Epoch, ImageNumber, ImageRef, JobId, Lease, Rect, Span, Timestamp};
 use session::{Backoff, Config, Effect, Event, Session, Welcome};
 
