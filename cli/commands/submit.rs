@@ -50,7 +50,7 @@ pub(crate) struct Submit {
     #[arg(long, value_name = "WxH", value_parser = values::resolution, help_heading = "How to compute it")]
     pub(crate) tile: Option<Resolution>,
 
-    /// Fewest pixels of a tile, where the coordinator chooses their size: the squarest that divides the image [default: 2500].
+    /// Fewest pixels of a tile, all of one size: the squarest that divides the image [default: tiles that take about the same time].
     #[arg(
         long,
         value_name = "N",

@@ -2,7 +2,8 @@
 //!
 //! A failure alone blames nobody: the tile may be at fault. It is when another worker
 //! has done the tile that the one that failed is known to be. A tile that it does itself
-//! clears it: only faults in a row tell a broken worker from bad luck.
+//! clears it: only faults in a row tell a broken worker from bad luck. At most half of the
+//! workers are set aside for a job: where more fail, they are not what is broken.
 
 use alloc::vec::Vec;
 
@@ -124,6 +125,11 @@ impl Sched {
 
     /// A worker did something wrong for a job that is not the job's fault.
     pub(crate) fn is_at_fault(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
+        // Where most workers fail it is not their fault.
+        let aside = self.jobs.get(&job).map_or(0, |job| job.aside);
+        if (aside as usize + 1) * 2 > self.workers.len() {
+            return;
+        }
         let worker = &mut self.workers[place];
         if worker.aside.fails(job, self.now, &self.config) == Verdict::Nothing {
             return;
@@ -164,7 +170,7 @@ impl Sched {
         out: &mut Vec<Effect>,
     ) {
         let live = self.workers[place].live.clone();
-        let of_job = |number: &u64| job.is_none_or(|job| self.attempts[number].image.job == job);
+        let of_job = |number: &u64| job.is_none_or(|job| self.attempts[*number].image.job == job);
         let ahead: Vec<u64> = live
             .into_iter()
             .filter(|number| of_job(number) && self.is_ahead(*number))

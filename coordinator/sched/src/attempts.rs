@@ -13,7 +13,7 @@ use crate::{Effect, Link, RevokeReason, Sched};
 impl Sched {
     /// Removes a live attempt; its tile waits for another where nobody who can be reached renders it.
     pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Attempt> {
-        let mut attempt = self.attempts.remove(&number)?;
+        let mut attempt = self.attempts.remove(number)?;
         self.timers.remove(Timer::Stuck(number), &mut attempt.stuck);
         let worker = &mut self.workers[attempt.worker];
         if let Ok(index) = worker.live.binary_search(&number) {
@@ -56,7 +56,7 @@ impl Sched {
 
     /// Its worker may have begun it after all, and what it sends may come too late.
     fn ends_on_purpose(&mut self, number: u64) {
-        let Some(attempt) = self.attempts.get(&number) else {
+        let Some(attempt) = self.attempts.get(number) else {
             return;
         };
         let (image, tile) = (attempt.image, attempt.tile);
@@ -89,14 +89,14 @@ impl Sched {
         match live {
             [None, _] => work.reopen(number),
             [Some(one), None] => {
-                let away = self.workers[self.attempts[&one].worker].link == Link::Closed;
+                let away = self.workers[self.attempts[one].worker].link == Link::Closed;
                 work.share(number, away);
                 only = Some(one).filter(|_| !away);
             }
             [Some(_), Some(_)] => work.share(number, false),
         }
         for attempt in live.into_iter().flatten() {
-            let state = self.attempts.get_mut(&attempt).expect("it is live");
+            let state = self.attempts.get_mut(attempt).expect("it is live");
             let key = (only == Some(attempt)).then_some(state.finish);
             if key != state.enlisted {
                 if let Some(old) = state.enlisted {
@@ -127,7 +127,7 @@ impl Sched {
     /// Ends an attempt that failed, and charges it to its tile.
     pub(crate) fn fail_attempt(&mut self, number: u64, reason: String, out: &mut Vec<Effect>) {
         let max = self.config.tile_failures_max;
-        let Some(attempt) = self.attempts.get(&number) else {
+        let Some(attempt) = self.attempts.get(number) else {
             return;
         };
         let (image, tile, rect) = (attempt.image, attempt.tile, attempt.rect);
@@ -152,7 +152,7 @@ impl Sched {
     /// Ends an attempt whose worker was lost while it ran, and charges that to its tile.
     pub(crate) fn lose_attempt(&mut self, number: u64, out: &mut Vec<Effect>) {
         let max = self.config.tile_losses_max;
-        let Some(attempt) = self.attempts.get(&number) else {
+        let Some(attempt) = self.attempts.get(number) else {
             return;
         };
         let (image, tile, rect) = (attempt.image, attempt.tile, attempt.rect);

@@ -128,7 +128,7 @@ impl Sched {
         let Some(number) = self.owned(id, arrival.block.attempt) else {
             return;
         };
-        let Some(attempt) = self.attempts.get_mut(&number) else {
+        let Some(attempt) = self.attempts.get_mut(number) else {
             return;
         };
         let fits = attempt.image == image && Some(attempt.tile) == arrival.tile;
@@ -172,7 +172,7 @@ impl Sched {
 
     /// Compares a block with what the other attempt at its tile made of it, if that is known.
     fn differs(&mut self, number: u64, rect: Rect, pixels: Digest) -> bool {
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         let (image, tile) = (attempt.image, attempt.tile);
         let Some((job, place)) = self.job_and_place(image) else {
             return false;
@@ -195,7 +195,7 @@ impl Sched {
     /// Two renderings of a block differ. Nobody knows which is right: the one that
     /// came later ends, its worker gets no more of the job for a while, and somebody is told.
     fn incident(&mut self, number: u64, block: BlockRef, out: &mut Vec<Effect>) {
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         let (place, tile) = (attempt.worker, attempt.tile);
         let worker = self.workers[place].id;
         let mut other = None;
@@ -204,7 +204,7 @@ impl Sched {
             let tile = job.work.get(&image).and_then(|work| work.tiles.get(tile));
             other = tile.and_then(|tile| tile.attempts().find(|&live| live != number));
         }
-        let other = other.map(|other| self.workers[self.attempts[&other].worker].id);
+        let other = other.map(|other| self.workers[self.attempts[other].worker].id);
         out.push(Effect::Incident {
             block,
             worker,
@@ -232,7 +232,7 @@ impl Sched {
             [attempts.next(), attempts.next()]
         };
         for number in live.into_iter().flatten() {
-            let attempt = self.attempts.get(&number);
+            let attempt = self.attempts.get(number);
             if attempt.is_some_and(Attempt::is_delivered) {
                 self.end_attempt(number);
             } else {

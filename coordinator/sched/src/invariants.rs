@@ -91,7 +91,7 @@ impl Sched {
                 for (number, tile) in work.tiles.iter() {
                     assert!(tile.live_count() <= LIVE_MAX);
                     let is_away =
-                        |number| self.workers[self.attempts[&number].worker].link == Link::Closed;
+                        |number| self.workers[self.attempts[number].worker].link == Link::Closed;
                     let away = tile.attempts().all(is_away);
                     assert_eq!(
                         work.is_shared(number),
@@ -99,7 +99,7 @@ impl Sched {
                         "a tile is open where nobody who can be reached renders it"
                     );
                     for attempt in tile.attempts() {
-                        let enlisted = self.attempts[&attempt].enlisted;
+                        let enlisted = self.attempts[attempt].enlisted;
                         let alone = tile.live_count() == 1 && !work.is_shared(number);
                         assert!(
                             enlisted.is_none() || alone,
@@ -109,17 +109,17 @@ impl Sched {
                 }
             }
             for &(key, number) in &job.ending {
-                assert_eq!(self.attempts[&number].enlisted, Some(key));
+                assert_eq!(self.attempts[number].enlisted, Some(key));
             }
         }
         let listed = self.jobs.values().map(|job| job.ending.len());
-        let enlisted = self.attempts.values();
-        let enlisted = enlisted.filter(|attempt| attempt.enlisted.is_some());
+        let enlisted = self.attempts.iter();
+        let enlisted = enlisted.filter(|(_, attempt)| attempt.enlisted.is_some());
         assert_eq!(listed.sum::<usize>(), enlisted.count());
     }
 
     fn check_attempts(&self) {
-        for (&number, attempt) in &self.attempts {
+        for (number, attempt) in self.attempts.iter() {
             let job = &self.jobs[&attempt.image.job];
             let place = job
                 .place(attempt.image.image)
@@ -143,17 +143,17 @@ impl Sched {
     fn check_workers(&self) {
         let stuck = self.attempts.iter();
         let mut timers: usize = stuck
-            .map(|(&number, attempt)| self.timers.check(Timer::Stuck(number), attempt.stuck))
+            .map(|(number, attempt)| self.timers.check(Timer::Stuck(number), attempt.stuck))
             .sum();
         let mut live = 0;
         let mut capacity = 0;
         for (place, worker) in self.workers.iter() {
             live += worker.live.len();
             assert!(worker.live.is_sorted());
-            let running = |number: &&u64| self.attempts[*number].phase == Phase::Running;
+            let running = |number: &&u64| self.attempts[**number].phase == Phase::Running;
             let idle = worker.live.len() - worker.live.iter().filter(running).count();
             assert_eq!(idle, worker.idle as usize);
-            let costs = worker.live.iter().map(|number| self.attempts[number].cost);
+            let costs = worker.live.iter().map(|number| self.attempts[*number].cost);
             assert_eq!(costs.sum::<u64>(), worker.backlog);
             assert_eq!(worker.kinds, self.kinds.served_by(&worker.offer));
             assert_eq!(worker.waiting.due().is_some(), worker.is_idle());

@@ -249,14 +249,14 @@ impl Sched {
                 self.offer_anew();
             }
         }
-        self.changed.remove(&id);
+        self.changed.retain(|&changed| changed != id);
         out.push(Effect::ForgetJob { job: id });
     }
 
     /// Watchers are to hear of a job, and it may belong elsewhere in the market.
     pub(crate) fn job_changed(&mut self, id: JobId) {
-        if self.jobs.contains_key(&id) {
-            self.changed.insert(id);
+        if !self.changed.contains(&id) && self.jobs.contains_key(&id) {
+            self.changed.push(id);
         }
     }
 

@@ -31,6 +31,7 @@ mod job;
 mod jobs;
 mod leasing;
 mod links;
+mod live;
 mod market;
 mod needs;
 mod pace;

@@ -88,7 +88,7 @@ impl Sched {
         for number in self.workers[place].live.clone() {
             if !held.contains(&number) {
                 self.end_attempt(number);
-            } else if let Some(attempt) = self.attempts.get(&number) {
+            } else if let Some(attempt) = self.attempts.get(number) {
                 self.reconsider(attempt.image, attempt.tile);
             }
         }
@@ -114,7 +114,7 @@ impl Sched {
                 });
                 continue;
             };
-            let attempt = self.attempts.get_mut(&number).expect("it is live");
+            let attempt = self.attempts.get_mut(number).expect("it is live");
             if attempt.reports(report.blocks) {
                 self.progress(number);
             }
@@ -126,7 +126,7 @@ impl Sched {
         let Some(limit) = self.block_limit(number) else {
             return;
         };
-        let attempt = self.attempts.get_mut(&number).expect("it has a limit");
+        let attempt = self.attempts.get_mut(number).expect("it has a limit");
         let place = attempt.worker;
         let (before, after) = (attempt.phase, attempt.phase_now());
         attempt.phase = after;
@@ -144,7 +144,7 @@ impl Sched {
 
     /// How long a live attempt may take over its next block.
     fn block_limit(&self, number: u64) -> Option<Span> {
-        let attempt = self.attempts.get(&number)?;
+        let attempt = self.attempts.get(number)?;
         let job = self.jobs.get(&attempt.image.job)?;
         let work = job.work.get(&job.place(attempt.image.image)?)?;
         let failures = work.tiles.get(attempt.tile)?.trouble.failures;
@@ -174,7 +174,7 @@ impl Sched {
         let live = worker.live.clone();
         self.worker_changed(place);
         for number in live {
-            let attempt = &self.attempts[&number];
+            let attempt = &self.attempts[number];
             self.reconsider(attempt.image, attempt.tile);
         }
     }
@@ -193,7 +193,7 @@ impl Sched {
         while let Some(timer) = self.timers.first(self.now) {
             let alarm = match timer {
                 Timer::Stuck(number) => {
-                    let attempt = self.attempts.get_mut(&number);
+                    let attempt = self.attempts.get_mut(number);
                     &mut attempt.expect("a timer ends with its attempt").stuck
                 }
                 Timer::Waiting(place) => &mut self.workers[place].waiting,
@@ -213,7 +213,7 @@ impl Sched {
     }
 
     fn stuck(&mut self, number: u64, out: &mut Vec<Effect>) {
-        let Some(attempt) = self.attempts.get(&number) else {
+        let Some(attempt) = self.attempts.get(number) else {
             return;
         };
         let seconds = attempt.limit.0 / 1_000_000;
@@ -226,7 +226,7 @@ impl Sched {
     fn idle_for_long(&mut self, place: Place, out: &mut Vec<Effect>) {
         let id = self.workers[place].id;
         for number in self.workers[place].live.clone() {
-            let Some(attempt) = self.attempts.get(&number) else {
+            let Some(attempt) = self.attempts.get(number) else {
                 continue;
             };
             if attempt.phase != Phase::Running {
@@ -245,7 +245,7 @@ impl Sched {
         reason: alloc::string::String,
         out: &mut Vec<Effect>,
     ) {
-        let worker = self.workers[self.attempts[&number].worker].id;
+        let worker = self.workers[self.attempts[number].worker].id;
         out.push(Effect::Revoke {
             worker,
             attempt: self.attempt_id(number),
@@ -256,7 +256,7 @@ impl Sched {
 
     fn lost(&mut self, place: Place, out: &mut Vec<Effect>) {
         for number in self.workers[place].live.clone() {
-            match self.attempts[&number].phase {
+            match self.attempts[number].phase {
                 Phase::Ahead => {
                     self.end_attempt(number);
                 }

@@ -14,11 +14,23 @@ pub(crate) const SPEED_USUAL: u32 = 1_024;
 const BLOCKS_REMEMBERED: u32 = 256;
 
 /// A worker's speed, measured block by block.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Pace {
     cost: u64,
     time: u64,
     blocks: u32,
+    speed: u32,
+}
+
+impl Default for Pace {
+    fn default() -> Self {
+        Self {
+            cost: 0,
+            time: 0,
+            blocks: 0,
+            speed: SPEED_USUAL,
+        }
+    }
 }
 
 impl Pace {
@@ -36,10 +48,15 @@ impl Pace {
             self.cost /= 2;
             self.time /= 2;
         }
+        self.speed = self.measured();
     }
 
     /// The speed; from 1/64 of the usual to 64 times that.
     pub(crate) fn speed(&self) -> u32 {
+        self.speed
+    }
+
+    fn measured(&self) -> u32 {
         if self.time == 0 || self.cost == 0 {
             return SPEED_USUAL;
         }

@@ -100,7 +100,7 @@ mod tests {
                     None => assert!(cells.insert(region.indices(grid).next())),
                 }
             }
-            assert_eq!(cells.len() as u32, columns * rows);
+            assert_eq!(u32::try_from(cells.len()), Ok(columns * rows));
             assert!(nodes.iter().copied().eq(0..2 * columns * rows - 1));
         }
     }

@@ -7,6 +7,7 @@ use model::{AttemptId, ImageRef, JobId, Rect, SubmissionId, Timestamp, WorkerId}
 
 use crate::attempt::{Attempt, is_block_of};
 use crate::job::Job;
+use crate::live::Live;
 use crate::market::Market;
 use crate::needs::Kinds;
 use crate::roster::Roster;
@@ -39,14 +40,14 @@ pub struct Sched {
     /// What all threads of workers that take tiles get done in a microsecond, times 1,024.
     pub(crate) capacity: u64,
     /// Live attempts by number.
-    pub(crate) attempts: BTreeMap<u64, Attempt>,
+    pub(crate) attempts: Live,
     pub(crate) attempts_made: u64,
     pub(crate) timers: Timers,
     pub(crate) market: Market,
     /// When it is worth looking again for help that jobs near their end could have.
     pub(crate) help_next: Timestamp,
-    /// Jobs that this event changed.
-    pub(crate) changed: BTreeSet<JobId>,
+    /// Jobs that this event changed, each once.
+    pub(crate) changed: Vec<JobId>,
 }
 
 impl Sched {
@@ -64,12 +65,12 @@ impl Sched {
             kinds: Kinds::default(),
             workers: Roster::default(),
             capacity: 0,
-            attempts: BTreeMap::new(),
+            attempts: Live::default(),
             attempts_made: 0,
             timers: Timers::default(),
             market: Market::default(),
             help_next: Timestamp::default(),
-            changed: BTreeSet::new(),
+            changed: Vec::new(),
         }
     }
 
@@ -107,13 +108,12 @@ impl Sched {
             Event::Goodbye { worker } => self.goodbye(worker, out),
             Event::Tick => self.tick(out),
         }
-        for job in self.changed.iter().copied().collect::<Vec<_>>() {
-            self.settle_job(job);
+        for index in 0..self.changed.len() {
+            self.settle_job(self.changed[index]);
         }
         self.lease_all(out);
-        while let Some(job) = self.changed.pop_first() {
-            out.push(Effect::JobChanged { job });
-        }
+        self.changed.sort_unstable();
+        out.extend(self.changed.drain(..).map(|job| Effect::JobChanged { job }));
     }
 
     /// When an [`Event::Tick`] is next worth sending; `None` while nothing is pending.
@@ -204,7 +204,7 @@ impl Sched {
     /// A live attempt; one of another epoch never is.
     pub(crate) fn live(&self, attempt: AttemptId) -> Option<&Attempt> {
         (attempt.epoch == self.config.epoch)
-            .then(|| self.attempts.get(&attempt.number))
+            .then(|| self.attempts.get(attempt.number))
             .flatten()
     }
 

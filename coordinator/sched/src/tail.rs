@@ -77,7 +77,7 @@ impl Sched {
         let Some((number, help)) = self.find_last(place, id) else {
             return false;
         };
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         let (image, tile) = (attempt.image, attempt.tile);
         match help {
             Help::CallBack => {
@@ -99,7 +99,7 @@ impl Sched {
         for _ in 0..ATTEMPTS_LOOKED_AT {
             let last = self.jobs.get(&id)?.ending.iter().rev().nth(passed);
             let &(key, number) = last?;
-            self.cost_all_anew(self.attempts[&number].worker);
+            self.cost_all_anew(self.attempts[number].worker);
             let finish = self.estimate(number);
             if finish < key {
                 self.expect(number, finish);
@@ -115,7 +115,7 @@ impl Sched {
 
     /// What a worker could do about an attempt that is expected to end at `finish`, if it gains enough.
     fn gains(&self, place: Place, number: u64, finish: Timestamp) -> Option<Help> {
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         let helper = &self.workers[place];
         if attempt.worker == place {
             return None;
@@ -180,19 +180,19 @@ impl Sched {
     }
 
     fn cost_anew(&mut self, number: u64) {
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         let job = &self.jobs[&attempt.image.job];
         let cost = job.costs.of_blocks(attempt.rect.blocks());
         if let Some(cost) = cost.filter(|_| attempt.cost == 0) {
             let worker = &mut self.workers[attempt.worker];
             worker.backlog = worker.backlog.saturating_add(cost);
-            self.attempts.get_mut(&number).expect("it is live").cost = cost;
+            self.attempts.get_mut(number).expect("it is live").cost = cost;
         }
     }
 
     /// When a live attempt is expected to end, by how far it is; later than now.
     fn estimate(&self, number: u64) -> Timestamp {
-        let attempt = &self.attempts[&number];
+        let attempt = &self.attempts[number];
         if attempt.cost == 0 {
             return Timestamp(u64::MAX);
         }
@@ -215,11 +215,11 @@ impl Sched {
 
     /// When a live attempt that is held ahead is expected to begin: after those that were leased before it.
     fn begins(&self, number: u64) -> Timestamp {
-        let worker = &self.workers[self.attempts[&number].worker];
+        let worker = &self.workers[self.attempts[number].worker];
         let before = worker.live.iter().take_while(|&&live| live != number);
         let left = before.map(|&live| match self.is_ahead(live) {
-            true => time_of(self.attempts[&live].cost, worker.pace.speed()),
-            false if self.attempts[&live].cost == 0 => Span(0),
+            true => time_of(self.attempts[live].cost, worker.pace.speed()),
+            false if self.attempts[live].cost == 0 => Span(0),
             false => self.estimate(live) - self.now,
         });
         let left = left.fold(Span(0), Span::add);
@@ -228,7 +228,7 @@ impl Sched {
 
     /// Moves an attempt to where it is now expected to end.
     fn expect(&mut self, number: u64, finish: Timestamp) {
-        let attempt = self.attempts.get_mut(&number).expect("it is listed");
+        let attempt = self.attempts.get_mut(number).expect("it is listed");
         attempt.finish = finish;
         if let Some(old) = attempt.enlisted.replace(finish)
             && let Some(job) = self.jobs.get_mut(&attempt.image.job)
@@ -240,8 +240,8 @@ impl Sched {
 
     /// Whether its worker cannot have started a live attempt yet, as far as is known here.
     pub(crate) fn is_ahead(&self, number: u64) -> bool {
-        let attempt = &self.attempts[&number];
-        let is_rendered = |live: u64| self.attempts[&live].phase == Phase::Delivering;
+        let attempt = &self.attempts[number];
+        let is_rendered = |live: u64| self.attempts[live].phase == Phase::Delivering;
         attempt.phase == Phase::Ahead
             && self.workers[attempt.worker].holds_ahead(number, is_rendered)
     }

@@ -162,8 +162,8 @@ impl TileGrid {
         }
         let column = (rect.x0 - self.x0) / self.width;
         let row = (rect.y0 - self.y0) / self.height;
-        let index = row * self.columns() + column;
-        self.tile(index).contains(rect).then_some(index)
+        let cell = self.span((column, row), (column + 1, row + 1));
+        (rect.x1 <= cell.x1 && rect.y1 <= cell.y1).then(|| row * self.columns() + column)
     }
 }
 

@@ -260,7 +260,7 @@ impl Sched {
         }
         let tile = work.tile_of(block).and_then(|tile| work.tiles.get(tile));
         if let Some(tile) = tile {
-            let worker = |number| self.workers[self.attempts[&number].worker].id;
+            let worker = |number| self.workers[self.attempts[number].worker].id;
             let mut attempts = tile.attempts().map(worker);
             return Some(WhyTile::Leased {
                 worker: attempts.next()?,

@@ -9,13 +9,13 @@ use situation::*;
 const ASIDE: Span = Span::from_secs(300);
 
 fn held(farm: &Farm, id: u64) -> u32 {
-    farm.sched.worker(worker(id)).unwrap().attempts
+    farm.sched.worker(worker(id)).expect("it joined").attempts
 }
 
 /// A new job, whose tiles come before those of all older ones.
 fn submits(farm: &mut Farm, job: u64) {
     let mut asked = submission(u128::from(job), 4);
-    asked.priority = i32::try_from(job).unwrap();
+    asked.priority = i32::try_from(job).expect("a small number");
     farm.is_told(Event::Submit(asked));
 }
 
@@ -25,7 +25,7 @@ fn holds(farm: &Farm, id: u64) -> (u64, u32, u32, u64) {
         let (by, image, rect) = farm.sched.attempt(attempt(number))?;
         (by == worker(id)).then_some((number, image.image.0, rect.y0 / 32, image.job.0))
     });
-    live.unwrap()
+    live.expect("it holds one")
 }
 
 /// Worker 1 fails a tile, and worker 2 does that tile.
@@ -88,6 +88,18 @@ fn a_worker_that_fails_what_another_does_is_set_aside_for_the_job_and_let_back()
     farm.heartbeat(2, &[])
         .waits_with_heartbeats(Span::from_secs(2), 1, &[]);
     assert_eq!(held(&farm, 1), 1, "it is let back");
+}
+
+#[test]
+fn a_tile_that_a_worker_does_itself_clears_it() {
+    let mut farm = two_workers();
+    fails_where_another_succeeds(&mut farm);
+    farm.wants_tiles(1, 1);
+    let (number, image, index, _) = holds(&farm, 1);
+    farm.wants_tiles(1, 0).stores_tile(1, number, image, index);
+    fails_where_another_succeeds(&mut farm);
+    farm.wants_tiles(1, 1);
+    assert_eq!(held(&farm, 1), 1);
 }
 
 #[test]
@@ -167,4 +179,24 @@ fn a_tile_that_fails_everywhere_fails_its_image_and_blames_nobody() {
     for id in 1..=3 {
         assert_eq!(farm.sched.worker(worker(id)).unwrap().aside, None);
     }
+}
+
+#[test]
+fn no_more_than_half_of_the_workers_are_set_aside() {
+    let mut farm = Farm::new(Config {
+        faults_max: 1,
+        ..Config::new(EPOCH)
+    });
+    farm.worker(1, 0).worker(2, 0).worker(3, 0);
+    submits(&mut farm, 1);
+    // Of three, only one: first worker 1, then worker 3 would be.
+    for id in [1, 3] {
+        farm.wants_tiles(2, 0).wants_tiles(id, 1);
+        let (number, image, index, _) = holds(&farm, id);
+        farm.wants_tiles(id, 0).fails(id, number).wants_tiles(2, 1);
+        let (number, ..) = holds(&farm, 2);
+        farm.wants_tiles(2, 0).stores_tile(2, number, image, index);
+    }
+    farm.wants_tiles(1, 1).wants_tiles(3, 1);
+    assert_eq!([1, 3].map(|id| held(&farm, id)), [0, 1]);
 }

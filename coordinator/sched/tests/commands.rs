@@ -102,14 +102,12 @@ fn farm_with_a_failure() -> Farm {
     let mut farm = farm();
     farm.job(2).worker(1, 4);
     farm.stores(1, 1, 0, block(0));
-    for number in 3..5 {
-        farm.stores_tile(1, number, 1, u32::try_from(number).unwrap() - 3);
-    }
+    farm.stores_tile(1, 3, 1, 0).stores_tile(1, 4, 1, 1);
     farm.encoded(1).is_told(Event::ImageFailed {
         image: image_ref(0),
         reason: "no space".into(),
     });
-    let job = farm.sched.job(JobId(1)).unwrap();
+    let job = farm.sched.job(JobId(1)).expect("it is known");
     assert_eq!(job.state, JobState::Over(JobOutcome::Failed));
     assert_eq!(job.pixels_done, 64 * 64, "those of a failed image are gone");
     farm.never_mind();

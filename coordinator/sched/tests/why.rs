@@ -9,19 +9,21 @@ use sched::{
 use situation::*;
 
 fn job(farm: &Farm, id: u64) -> WhyJob {
-    farm.sched.why_job(JobId(id)).unwrap()
+    farm.sched.why_job(JobId(id)).expect("it is known")
 }
 
 fn image(farm: &Farm, image: u32) -> WhyImage {
-    farm.sched.why_image(image_ref(image)).unwrap()
+    farm.sched.why_image(image_ref(image)).expect("it is known")
 }
 
 fn tile_of(farm: &Farm, image: u32, index: u32) -> WhyTile {
-    farm.sched.why_tile(image_ref(image), block(index)).unwrap()
+    farm.sched
+        .why_tile(image_ref(image), block(index))
+        .expect("it is known")
 }
 
 fn idle(farm: &Farm, id: u64) -> WhyWorker {
-    farm.sched.why_worker(worker(id)).unwrap()
+    farm.sched.why_worker(worker(id)).expect("it is known")
 }
 
 #[test]
