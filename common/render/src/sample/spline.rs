@@ -8,8 +8,8 @@ pub const FILTER_ORDER_MAX: u32 = 64;
 /// Half the number of spans of the table from which Newton's method starts.
 const SPANS: usize = 256;
 
-/// Newton's method ends when a step is shorter than this, in pixels.
-const STEP_MIN: f64 = 1e-13;
+/// Newton's method ends after a step that is shorter than this, in pixels: the next one would be about its square.
+const STEP_MIN: f64 = 1e-8;
 
 /// Most Newton steps: far tails of high orders gain only a factor of (m − 1)/m with each.
 const STEPS_MAX: usize = 4096;
@@ -18,8 +18,17 @@ const STEPS_MAX: usize = 4096;
 #[derive(Clone, Debug)]
 pub(crate) struct BSpline {
     order: usize,
+    /// N_m and n_m from each whole number on, up to the middle: polynomials of the place from there.
+    pieces: Vec<Piece>,
     /// The inverse at y = i / (2 · `SPANS`), from 0 to the middle.
     starts: Vec<f64>,
+}
+
+/// Polynomials of a number between 0 and 1, the constant first.
+#[derive(Clone, Debug)]
+struct Piece {
+    distribution: Vec<f64>,
+    density: Vec<f64>,
 }
 
 impl BSpline {
@@ -28,6 +37,7 @@ impl BSpline {
         let order = order.clamp(1, FILTER_ORDER_MAX) as usize;
         let mut spline = Self {
             order,
+            pieces: pieces(order),
             starts: Vec::new(),
         };
         let middle = spline.width() / 2.0;
@@ -46,40 +56,28 @@ impl BSpline {
         self.order as f64
     }
 
-    /// N_m(x) and n_m(x), thesis eqs. (6.15c), (6.15d) and (6.16), by a triangle of differences.
-    ///
-    /// `x` lies in 0 … m.
+    /// N_m(x) and n_m(x), thesis eqs. (6.15c), (6.15d) and (6.16); `x` lies in 0 … m/2.
+    #[inline]
     fn distribution(&self, x: f64) -> (f64, f64) {
-        let m = self.order;
-        // row[k] is N_q(x − k), for growing q.
-        let mut row = [0.0; FILTER_ORDER_MAX as usize + 1];
-        for (k, value) in row.iter_mut().enumerate().take(m) {
-            let x = x - k as f64;
-            *value = if x < 0.0 {
-                0.0
-            } else if x < 1.0 {
-                x
-            } else {
-                1.0
-            };
-        }
-        if m == 1 {
-            return (row[0], if x < 1.0 { 1.0 } else { 0.0 });
-        }
-        for q in 2..m {
-            for k in 0..=m - q {
-                let share = (x - k as f64) / q as f64;
-                row[k] = share * row[k] + (1.0 - share) * row[k + 1];
-            }
-        }
-        let share = x / self.width();
-        (share * row[0] + (1.0 - share) * row[1], row[0] - row[1])
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "a place in a list, held to it"
+        )]
+        let number = (x as usize).min(self.pieces.len() - 1);
+        let piece = &self.pieces[number];
+        let s = x - number as f64;
+        let at = |polynomial: &[f64]| {
+            let mut coefficients = polynomial.iter().rev();
+            let first = coefficients.next().copied().unwrap_or_default();
+            coefficients.fold(first, |value, coefficient| value * s + coefficient)
+        };
+        (at(&piece.distribution), at(&piece.density))
     }
 
     /// The x with N_m(x) = y, y in 0 … ½, by Newton's method, thesis eq. (6.19) mended.
     ///
-    /// `start` is no less than the root and no more than m/2: there N_m is
-    /// convex, so that every step falls short of the root and none passes it.
+    /// There N_m is convex, so that the first step may pass the root, and every other one falls short of it.
     fn solve(&self, y: f64, start: f64) -> f64 {
         if y <= 0.0 {
             return 0.0;
@@ -91,12 +89,13 @@ impl BSpline {
                 break;
             }
             let step = (value - y) / slope;
-            x -= step;
-            if step < STEP_MIN {
+            let next = x - step;
+            x = next.clamp(0.0, self.width() / 2.0);
+            if step.abs() < STEP_MIN {
                 break;
             }
         }
-        if x < 0.0 { 0.0 } else { x }
+        x
     }
 
     /// Where a sample lies, in pixels from the filter's centre, for a uniform `y` in [0, 1).
@@ -110,14 +109,75 @@ impl BSpline {
             reason = "between 0 and SPANS, from a tail between 0 and 1/2"
         )]
         let span = (tail * (2 * SPANS) as f64) as usize;
-        let start = self.starts[(span + 1).min(SPANS)];
+        let span = span.min(SPANS - 1);
+        let part = tail * (2 * SPANS) as f64 - span as f64;
+        let (below, above) = (self.starts[span], self.starts[span + 1]);
+        // On the chord, close below the root; in the outermost span, where N_m is flat, from above.
+        let start = if span == 0 {
+            above
+        } else {
+            below + (above - below) * part
+        };
         (self.solve(tail, start) - half) * sign
     }
+}
+
+/// The pieces of the B-spline of order m up to its middle, by the recursion n_q(x) = (x n_{q−1}(x) + (q − x) n_{q−1}(x − 1)) / (q − 1).
+fn pieces(m: usize) -> Vec<Piece> {
+    let count = m.div_ceil(2);
+    // densities[j] is n_q over j … j + 1.
+    let mut densities = vec![vec![0.0; m]; count];
+    densities[0][0] = 1.0;
+    for q in 2..=m {
+        for j in (0..count).rev() {
+            let mut next = vec![0.0; m];
+            let mut add = |of: &[f64], constant: f64, slope: f64| {
+                for (k, value) in of.iter().enumerate().take(q - 1) {
+                    next[k] += constant * value / (q - 1) as f64;
+                    next[k + 1] += slope * value / (q - 1) as f64;
+                }
+            };
+            add(&densities[j], j as f64, 1.0);
+            if j > 0 {
+                add(&densities[j - 1], (q - j) as f64, -1.0);
+            }
+            densities[j] = next;
+        }
+    }
+    let mut below = 0.0;
+    let integrated = |density: Vec<f64>| {
+        let parts = density.iter().enumerate();
+        let mut distribution = vec![below];
+        distribution.extend(parts.map(|(k, value)| value / (k + 1) as f64));
+        below = distribution.iter().sum();
+        Piece {
+            distribution,
+            density,
+        }
+    };
+    densities.into_iter().map(integrated).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// N_m(x) and n_m(x) by a triangle of differences, x in 0 … m.
+    fn triangle(m: usize, x: f64) -> (f64, f64) {
+        // row[k] is N_q(x − k), for growing q.
+        let mut row: Vec<f64> = (0..=m).map(|k| (x - k as f64).clamp(0.0, 1.0)).collect();
+        if m == 1 {
+            return (row[0], if x < 1.0 { 1.0 } else { 0.0 });
+        }
+        for q in 2..m {
+            for k in 0..=m - q {
+                let share = (x - k as f64) / q as f64;
+                row[k] = share * row[k] + (1.0 - share) * row[k + 1];
+            }
+        }
+        let share = x / m as f64;
+        (share * row[0] + (1.0 - share) * row[1], row[0] - row[1])
+    }
 
     /// Evenly spread numbers in [0, 1), tails included.
     fn shares() -> impl Iterator<Item = f64> {
@@ -131,7 +191,7 @@ mod tests {
             let spline = BSpline::new(order);
             for y in shares() {
                 let x = spline.inverse(y) + f64::from(order) / 2.0;
-                let (back, _) = spline.distribution(x);
+                let (back, _) = triangle(order as usize, x);
                 assert!((back - y).abs() < 1e-12, "order {order}: {y} gave {back}");
             }
         }
@@ -154,7 +214,7 @@ mod tests {
     #[test]
     fn the_cubic_is_the_known_polynomial() {
         let cubic = BSpline::new(4);
-        for i in 0..=400 {
+        for i in 0..=200 {
             let x = f64::from(i) / 100.0;
             let s = (x - 2.0).abs();
             let density = if s < 1.0 {
