@@ -300,7 +300,7 @@ fn a_difference_is_found_where_it_is() {
         .remove(0);
     drop(scratch);
 
-    let changed = image::Scratch::create(folder.path().join("changed"), identity(), CROP).unwrap();
+    let changed = Scratch::create(folder.path().join("changed"), identity(), CROP).unwrap();
     let all = blocks(CROP, 64, 64);
     let pixel = Rect {
         x0: 70,
@@ -376,7 +376,7 @@ fn frames_of_other_sizes_cannot_be_compared() {
 #[test]
 fn an_unfinished_image_makes_no_frame() {
     let folder = tempfile::tempdir().unwrap();
-    let scratch = image::Scratch::create(folder.path().join("scratch"), identity(), CROP).unwrap();
+    let scratch = Scratch::create(folder.path().join("scratch"), identity(), CROP).unwrap();
     let error = finish(&scratch, &request(folder.path(), "exr,png")).unwrap_err();
     assert!(matches!(error, ImageError::Incomplete { missing, .. } if missing == CROP.area()));
     assert_eq!(names(folder.path()), ["scratch", "scratch.journal"]);
