@@ -7,8 +7,11 @@ use clap::{Args, Subcommand};
 use model::JobId;
 use serde::Serialize;
 use tokio::sync::mpsc;
+use wire::proto::job_command::Command as Wanted;
 use wire::proto::job_update::Update;
-use wire::proto::{ImageState, ImageStatus, JobRequest, JobSummary, ListJobsRequest};
+use wire::proto::{
+    self, ImageState, ImageStatus, JobRequest, JobSummary, ListJobsRequest, Pause, Remove, Resume,
+};
 
 use crate::error::{Ending, Error};
 use crate::existing::stem;
@@ -32,8 +35,38 @@ pub(crate) enum JobCommand {
     Log(Named),
     /// Ends a job; finished frames stay.
     Cancel(Named),
+    /// Says why a job, or one of its frames, is not finished.
+    Why(Why),
+    /// Begins nothing more of a job; what is being rendered is finished.
+    Pause(Named),
+    /// Goes on with a job that was paused.
+    Resume(Named),
+    /// Serves a job before those of lower priority; jobs begin with 0.
+    Priority(Priority),
+    /// Forgets a job, ending it first; finished frames stay on the coordinator's disk.
+    Remove(Named),
     /// Fetches the finished frames of a job.
     Fetch(Fetch),
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Why {
+    #[command(flatten)]
+    named: Named,
+
+    /// One of its frames.
+    #[arg(long, value_name = "N")]
+    frame: Option<u32>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Priority {
+    #[command(flatten)]
+    named: Named,
+
+    /// The priority; it may be negative.
+    #[arg(value_name = "N", allow_negative_numbers = true)]
+    priority: i32,
 }
 
 #[derive(Args, Debug)]
@@ -86,6 +119,25 @@ pub(crate) fn run(context: &Context, command: JobCommand) -> Result<Ending, Erro
         JobCommand::Watch(options) => watch(context, &options),
         JobCommand::Log(named) => block_on(log(context, &named)),
         JobCommand::Cancel(named) => block_on(cancel(context, &named)),
+        JobCommand::Why(options) => block_on(why(context, &options)),
+        JobCommand::Pause(named) => {
+            let wanted = Wanted::Pause(Pause {});
+            block_on(want(context, &named, "pause", wanted))
+        }
+        JobCommand::Resume(named) => {
+            let wanted = Wanted::Resume(Resume {});
+            block_on(want(context, &named, "resume", wanted))
+        }
+        JobCommand::Priority(options) => {
+            let priority = options.priority;
+            let wanted = Wanted::Priority(proto::Priority { priority });
+            let attempt = "change the priority of";
+            block_on(want(context, &options.named, attempt, wanted))
+        }
+        JobCommand::Remove(named) => {
+            let wanted = Wanted::Remove(Remove {});
+            block_on(want(context, &named, "remove", wanted))
+        }
         JobCommand::Fetch(options) => block_on(fetch(context, &options)),
     }
 }
@@ -253,6 +305,65 @@ async fn cancel(context: &Context, named: &Named) -> Result<Ending, Error> {
         .await
         .map_err(|status| refused(format!("cannot cancel job {}", named.job), status))?;
     output::print(context.output, &Job::from(answer.into_inner()))?;
+    Ok(Ending::Done)
+}
+
+/// Wants something of a job, and shows it as it is then.
+async fn want(
+    context: &Context,
+    named: &Named,
+    attempt: &str,
+    wanted: Wanted,
+) -> Result<Ending, Error> {
+    let mut farm = context.connect(&named.farm).await?;
+    let answer = farm
+        .command_job(proto::JobCommand {
+            job: named.job,
+            command: Some(wanted),
+        })
+        .await
+        .map_err(|status| refused(format!("cannot {attempt} job {}", named.job), status))?;
+    output::print(context.output, &Job::from(answer.into_inner()))?;
+    Ok(Ending::Done)
+}
+
+/// `job why`.
+#[derive(Serialize)]
+struct Reason {
+    /// The job.
+    job: u64,
+    /// The frame asked for; null is the job as a whole.
+    frame: Option<u32>,
+    /// Why it is not finished, a sentence.
+    why: String,
+}
+
+impl Report for Reason {
+    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.why)
+    }
+
+    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.table(out)
+    }
+}
+
+async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
+    let job = options.named.job;
+    let mut farm = context.connect(&options.named.farm).await?;
+    let answer = farm
+        .why(proto::WhyRequest {
+            job,
+            image: options.frame,
+        })
+        .await
+        .map_err(|status| refused(format!("cannot say why job {job} waits"), status))?;
+    let reason = Reason {
+        job,
+        frame: options.frame,
+        why: answer.into_inner().sentence,
+    };
+    output::print(context.output, &reason)?;
     Ok(Ending::Done)
 }
 

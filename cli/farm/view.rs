@@ -19,8 +19,10 @@ pub(crate) struct Job {
     pub(crate) job: u64,
     /// What its user calls it.
     pub(crate) name: String,
-    /// `running`, `done`, `failed` or `cancelled`.
+    /// `running`, `paused`, `done`, `failed` or `cancelled`.
     pub(crate) state: &'static str,
+    /// Jobs of higher priority are served first.
+    pub(crate) priority: i32,
     /// The frames asked for, such as `0..24`.
     pub(crate) frames: String,
     /// How many frames that is.
@@ -196,6 +198,7 @@ impl From<proto::JobSummary> for Job {
         let frames = job.frames.map(FrameRange::try_from);
         Self {
             state: match job.state() {
+                JobState::Unspecified | JobState::Running if job.paused => "paused",
                 JobState::Unspecified | JobState::Running => "running",
                 JobState::Done => "done",
                 JobState::Failed => "failed",
@@ -217,6 +220,7 @@ impl From<proto::JobSummary> for Job {
                 .collect(),
             job: job.job,
             name: job.name,
+            priority: job.priority,
             images_total: job.images,
             images_done: job.images_done,
             images_failed: job.images_failed,

@@ -18,7 +18,7 @@ impl Job {
     /// Whether it is over.
     #[track_caller]
     pub(crate) fn is_over(&self) -> bool {
-        self.state() != "running"
+        !matches!(self.state(), "running" | "paused")
     }
 
     /// One of its numbers.

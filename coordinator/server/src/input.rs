@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
-use sched::{BlockRef, Event, LinkId};
+use sched::{BlockRef, Command, Event, LinkId};
 use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc, oneshot};
 use tonic::Status;
 use wire::Failure;
@@ -22,8 +22,8 @@ pub(crate) type Reply<T> = oneshot::Sender<Result<T, Failure>>;
 pub(crate) enum Input {
     /// A submission has arrived whole.
     Submit(Box<NewJob>, Reply<proto::Submitted>),
-    /// A user ends a job.
-    Cancel(JobId, Reply<proto::JobSummary>),
+    /// A user wants something of a job.
+    Command(JobId, Command, Reply<proto::JobSummary>),
     /// A question; changes nothing.
     Ask(Query),
     /// A worker said hello.
@@ -85,6 +85,8 @@ pub(crate) enum Query {
     Bytes(Digest, Wanted, Reply<PathBuf>),
     /// All workers.
     Workers(Reply<proto::WorkerList>),
+    /// Why a job, or an image of it, is not finished.
+    Why(JobId, Option<ImageNumber>, Reply<proto::WhyReply>),
     /// The farm.
     Info(Reply<proto::FarmInfo>),
 }

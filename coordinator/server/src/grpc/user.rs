@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use model::{ImageNumber, JobId};
+use sched::Command;
 use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Request, Response, Status, Streaming};
@@ -81,8 +82,38 @@ impl Farm for Door {
 
     async fn cancel_job(&self, request: Request<proto::JobRequest>) -> Answer<proto::JobSummary> {
         let job = JobId(request.get_ref().job);
-        let summary = self.ask(|reply| Input::Cancel(job, reply)).await?;
+        let cancel = Command::Cancel;
+        let summary = self.ask(|reply| Input::Command(job, cancel, reply)).await?;
         Ok(Response::new(summary))
+    }
+
+    async fn command_job(&self, request: Request<proto::JobCommand>) -> Answer<proto::JobSummary> {
+        use proto::job_command::Command as Wanted;
+        let request = request.get_ref();
+        let job = JobId(request.job);
+        let command = match &request.command {
+            Some(Wanted::Pause(_)) => Command::Pause,
+            Some(Wanted::Resume(_)) => Command::Resume,
+            Some(Wanted::Priority(wanted)) => Command::Priority(wanted.priority),
+            Some(Wanted::Remove(_)) => Command::Remove,
+            None => {
+                let sentence = "the command is of no kind that this coordinator knows";
+                return Err(Failure::new(ErrorKind::BadRequest, sentence).into());
+            }
+        };
+        let summary = self
+            .ask(|reply| Input::Command(job, command, reply))
+            .await?;
+        Ok(Response::new(summary))
+    }
+
+    async fn why(&self, request: Request<proto::WhyRequest>) -> Answer<proto::WhyReply> {
+        let request = request.get_ref();
+        let (job, image) = (JobId(request.job), request.image.map(ImageNumber));
+        let why = self
+            .ask(|reply| Input::Ask(Query::Why(job, image, reply)))
+            .await?;
+        Ok(Response::new(why))
     }
 
     type FetchFrameStream = Chunks<proto::FrameChunk>;

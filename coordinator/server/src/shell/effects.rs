@@ -95,8 +95,8 @@ impl Shell {
                 worker,
                 other,
             } => self.incident(block, worker, other),
-            // Nobody waits for these words: whoever cancels is shown the job.
-            Effect::Commanded { .. } | Effect::CommandRefused { .. } => {}
+            Effect::Commanded { .. } => {}
+            Effect::CommandRefused { refusal, .. } => self.refused = Some(refusal),
             Effect::DropScratch { image } => {
                 if let Some(job) = self.jobs.get_mut(image.job) {
                     job.take_counters(image.image);

@@ -19,13 +19,8 @@ impl Shell {
     pub(super) fn take(&mut self, input: Input) -> Next {
         match input {
             Input::Submit(new, reply) => self.submit(new, reply),
-            Input::Cancel(job, reply) => {
-                let known = self.sched.job(job).is_some();
-                if known {
-                    let command = Command::Cancel;
-                    self.feed(Event::Command { job, command });
-                }
-                let _ = reply.send(self.summary(job).ok_or_else(|| super::views::no_job(job)));
+            Input::Command(job, command, reply) => {
+                let _ = reply.send(self.command(job, command));
             }
             Input::Ask(query) => self.answer(query),
             Input::Hello(greeting) => self.greet(*greeting),
@@ -141,6 +136,26 @@ impl Shell {
             _ => {}
         }
         self.feed(event);
+    }
+
+    /// Does what a user wants of a job; answers with the job as it is then, or was where it is forgotten.
+    fn command(&mut self, job: JobId, command: Command) -> Result<proto::JobSummary, Failure> {
+        let before = self.summary(job).ok_or_else(|| super::views::no_job(job))?;
+        self.refused = None;
+        self.feed(Event::Command { job, command });
+        if let Some(refusal) = self.refused.take() {
+            return Err(Failure::new(ErrorKind::BadRequest, refusal.to_string()));
+        }
+        let said = match command {
+            Command::Pause => "paused by its user".to_owned(),
+            Command::Resume => "resumed by its user".to_owned(),
+            Command::Priority(priority) => format!("its priority is {priority} now"),
+            _ => String::new(),
+        };
+        if !said.is_empty() {
+            self.say(job, said);
+        }
+        Ok(self.summary(job).unwrap_or(before))
     }
 
     fn open_delivery(

@@ -49,6 +49,8 @@ pub(crate) struct Shell {
     workers: Workers,
     /// The submission that is being fed, until the scheduler has answered.
     submitting: Option<(SubmissionId, Box<NewJob>, Reply<proto::Submitted>)>,
+    /// Why the command that was just fed is refused, if it is.
+    refused: Option<sched::CommandRefusal>,
     effects: Vec<Effect>,
 }
 
@@ -84,6 +86,7 @@ impl Shell {
             jobs: Jobs::default(),
             workers: Workers::new(),
             submitting: None,
+            refused: None,
             effects: Vec::new(),
         }
     }

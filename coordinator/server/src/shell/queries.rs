@@ -1,6 +1,6 @@
 //! Answers to questions.
 
-use model::{Digest, ImageNumber, JobId};
+use model::{Digest, ImageNumber, ImageRef, JobId};
 use std::path::PathBuf;
 use wire::Failure;
 use wire::proto::{self, ErrorKind};
@@ -46,6 +46,9 @@ impl Shell {
                     .collect();
                 let _ = reply.send(Ok(proto::WorkerList { workers }));
             }
+            Query::Why(job, image, reply) => {
+                let _ = reply.send(self.why(job, image));
+            }
             Query::Info(reply) => {
                 let _ = reply.send(Ok(self.info()));
             }
@@ -56,6 +59,23 @@ impl Shell {
     pub(super) fn summary(&self, id: JobId) -> Option<proto::JobSummary> {
         let view = self.sched.job(id)?;
         Some(views::summary(&self.clock, &view, self.jobs.get(id)?))
+    }
+
+    /// Why a job, or an image of it, is not finished.
+    fn why(&self, job: JobId, image: Option<ImageNumber>) -> Result<proto::WhyReply, Failure> {
+        let of_job = self.sched.why_job(job).ok_or_else(|| views::no_job(job))?;
+        let sentence = match image {
+            None => of_job.to_string(),
+            Some(image) => {
+                let why = self.sched.why_image(ImageRef { job, image });
+                let no_image = || {
+                    let sentence = format!("job {job} has no frame {image}");
+                    Failure::new(ErrorKind::NotFound, sentence)
+                };
+                why.ok_or_else(no_image)?.to_string()
+            }
+        };
+        Ok(proto::WhyReply { sentence })
     }
 
     fn snapshot(&self, id: JobId) -> Result<Snapshot, Failure> {

@@ -70,6 +70,8 @@ pub(super) fn summary(clock: &Clock, view: &JobView<'_>, job: &Job) -> proto::Jo
         attempts_failed: view.attempts_failed,
         attempts_lost: view.attempts_lost,
         revision: view.revision.0,
+        paused: view.paused == sched::Paused::Yes,
+        priority: view.priority,
     }
 }
 
