@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use model::JobId;
+use tempfile::TempPath;
 use tokio::sync::mpsc::UnboundedReceiver;
 use wire::Failure;
 use wire::failure::Retry;
@@ -72,7 +73,9 @@ impl Fetcher<'_> {
             ))
         })?;
         let path = self.folder.join(name);
+        // Removed wherever this ends, also where it is interrupted.
         let part = self.folder.join(format!(".{name}.part"));
+        let part = TempPath::try_from_path(&part).map_err(|error| cannot_write(&part, error))?;
         if path.exists() {
             match self.existing {
                 Existing::Replace => {}
@@ -84,7 +87,8 @@ impl Fetcher<'_> {
             }
         }
         self.download(image, file, &part).await?;
-        put(&part, &path)?;
+        part.persist(&path)
+            .map_err(|error| cannot_write(&path, error.error))?;
         Ok(Fetched::New(path))
     }
 
@@ -101,9 +105,7 @@ impl Fetcher<'_> {
             // A PPM names no film: it is compared whole.
             None => {
                 self.download(image, file, part).await?;
-                let same = fs::read(part).ok() == fs::read(&path).ok();
-                let _ = fs::remove_file(part);
-                same
+                fs::read(part).ok() == fs::read(&path).ok()
             }
         };
         if same {
@@ -117,7 +119,7 @@ impl Fetcher<'_> {
         }
     }
 
-    /// Downloads a file to `part`; what is left of a failure is removed.
+    /// Downloads a file to `part`.
     async fn download(
         &self,
         image: &ImageStatus,
@@ -133,12 +135,7 @@ impl Fetcher<'_> {
             tries += 1;
             let failure = match self.try_download(image, file, part).await {
                 Ok(()) => return Ok(()),
-                Err(Broken::Here(error)) => {
-                    let _ = fs::remove_file(part);
-                    return Err(
-                        Error::failed(format!("cannot write `{}`", part.display())).because(error)
-                    );
-                }
+                Err(Broken::Here(error)) => return Err(cannot_write(part, error)),
                 Err(Broken::There(error)) => error,
                 Err(Broken::Asked(failure)) if failure.retry == Retry::Never => {
                     refused(attempt(), failure)
@@ -151,7 +148,6 @@ impl Fetcher<'_> {
                     refused(attempt(), failure)
                 }
             };
-            let _ = fs::remove_file(part);
             return Err(failure);
         }
     }
@@ -213,9 +209,8 @@ fn plain(name: &str) -> Option<&str> {
     (fits && name.chars().all(is_plain)).then_some(name)
 }
 
-fn put(part: &Path, path: &Path) -> Result<(), Error> {
-    fs::rename(part, path)
-        .map_err(|error| Error::failed(format!("cannot write `{}`", path.display())).because(error))
+fn cannot_write(path: &Path, error: std::io::Error) -> Error {
+    Error::failed(format!("cannot write `{}`", path.display())).because(error)
 }
 
 #[cfg(test)]
