@@ -44,7 +44,7 @@ pub(crate) struct Job {
     pub(crate) submission: SubmissionId,
     /// How its images are stored.
     pub(crate) plan: Arc<Plan>,
-    /// Its scene and assets on disk, until it is cancelled or forgotten.
+    /// Its scene and assets on disk, until it is over.
     pub(crate) upload: Option<Upload>,
     /// Its files, by image.
     pub(crate) files: BTreeMap<ImageNumber, Vec<proto::FrameFile>>,

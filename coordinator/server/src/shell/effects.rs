@@ -107,9 +107,7 @@ impl Shell {
             Effect::DropJob { job } => self.clear_job(job),
             Effect::JobDone { job, outcome } => self.job_done(job, outcome),
             Effect::ForgetJob { job } => {
-                if let Some(mut job) = self.jobs.remove(job) {
-                    self.drop_upload(&mut job);
-                }
+                self.jobs.remove(job);
             }
             Effect::JobChanged { job } => {
                 self.jobs.touch(job);
@@ -298,21 +296,15 @@ impl Shell {
         let Some(job) = self.jobs.get_mut(id) else {
             return;
         };
-        if is_cancelled {
-            job.plan.cancelled.store(true, Ordering::Relaxed);
-            if let Some(upload) = job.upload.take() {
-                self.storage.remove(upload);
-            }
-        }
-        let folders = job.folders().clone();
-        self.storage.clear(folders);
-    }
-
-    /// Removes the scene and assets of a job that nothing can be asked of any more.
-    fn drop_upload(&self, job: &mut Job) {
+        // Nobody can ask for a retry yet, which would need the scene again.
         if let Some(upload) = job.upload.take() {
             self.storage.remove(upload);
         }
+        if is_cancelled {
+            job.plan.cancelled.store(true, Ordering::Relaxed);
+        }
+        let folders = job.folders().clone();
+        self.storage.clear(folders);
     }
 
     /// Two workers made different pixels of one block.
