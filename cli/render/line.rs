@@ -192,9 +192,11 @@ mod tests {
             .collect();
         assert_eq!(kinds, [false, false, true]);
         assert!(!line.is_empty());
-        let Next::Block(..) = line.next() else {
-            panic!("a block is left")
-        };
+        for _ in 0..2 {
+            let Next::Block(..) = line.next() else {
+                panic!("a block is left")
+            };
+        }
         assert!(!line.is_empty());
         assert!(line.opened(ImageNumber(1), vec![]).is_some());
         assert!(line.is_empty());
