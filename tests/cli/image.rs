@@ -73,11 +73,20 @@ fn a_frame_says_what_it_shows() {
         (&info["parts"][0]["width"], &info["parts"][0]["height"]),
         (&40.into(), &30.into())
     );
-    let statistics: Value =
-        serde_json::from_str(info["metadata"]["flyby:statistics"].as_str().unwrap()).unwrap();
+    let told = |name: &str| -> Value {
+        serde_json::from_str(info["metadata"][name].as_str().unwrap()).unwrap()
+    };
+    let mut statistics = told("flyby:statistics");
     assert_eq!(statistics["pixels"], 40 * 30);
-    let names = statistics.as_object().unwrap().values();
-    assert!(names.into_iter().all(Value::is_u64), "counts alone");
+    let method = statistics.as_object_mut().unwrap().remove("method");
+    assert!(method.is_some_and(|method| method.is_string()));
+    let counts = statistics.as_object().unwrap().values();
+    assert!(
+        counts.into_iter().all(Value::is_u64),
+        "counts, and no times"
+    );
+    let guarantee = told("flyby:settings")["guarantee"].to_string();
+    assert!(guarantee.contains("proven"), "{guarantee}");
     let (table, _) = place.ends(0, &["image", "info", "a/ball_0001.exr"]);
     assert!(
         table.contains("N.X") && table.contains("flyby:sceneDigest"),
