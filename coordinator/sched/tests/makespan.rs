@@ -333,7 +333,7 @@ fn a_farm_takes_no_longer_than_its_work_by_more_than_two_in_a_hundred() {
 }
 
 #[test]
-#[ignore = "simulates six farms of 1,000 workers to compare what is done about the end of a job"]
+#[ignore = "long: tests/run --all"]
 fn what_is_done_about_the_end_of_a_job_is_worth_it() {
     let never = TailGain {
         call_back: None,
