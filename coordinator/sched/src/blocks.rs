@@ -81,6 +81,9 @@ impl Sched {
         job.tally.pixels_done += new;
         job.tally.blocks_done += u64::from(new > 0);
         job.tally.started.get_or_insert(self.now);
+        if attempt.epoch != self.config.epoch && new > 0 {
+            job.recall_block(rect, elapsed);
+        }
         out.push(ack);
         let arrival = Arrival {
             block,

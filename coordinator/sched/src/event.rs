@@ -15,7 +15,10 @@ use crate::{Command, Needs, Offer};
 /// Those that [`Event::is_durable`] are what a journal holds: the shell commits them before it
 /// performs their effects. The others are volatile. The durable ones alone, told again in
 /// order to a scheduler of a later epoch, bring back every job, image and acknowledged
-/// block (`tests/replay.rs`); what is lost is who renders what, and how fast.
+/// block (`tests/histories.rs`); what is lost is who renders what, and how fast.
+///
+/// A store need not keep what later events made superfluous: the number of a job that was forgotten, the blocks of
+/// an image that is encoded. [`Event::JobsRecalled`] and [`Event::ImageRecalled`] stand for those (`tests/recall.rs`).
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Event {
     /// A user submitted a job. Answered by [`crate::Effect::Submitted`] or
@@ -44,6 +47,23 @@ pub enum Event {
         image: ImageRef,
         /// Its film digest.
         film: Digest,
+    },
+    /// Jobs are numbered after this one from now on: told by a store, before each job that it
+    /// kept and after the last.
+    JobsRecalled {
+        /// The largest number given so far.
+        last: JobId,
+    },
+    /// An image was encoded in an earlier epoch: told by a store in place of its blocks.
+    ImageRecalled {
+        /// The image.
+        image: ImageRef,
+        /// Its film digest.
+        film: Digest,
+        /// How many blocks it was made of.
+        blocks: u32,
+        /// How long they took, each on one thread.
+        render_time: Span,
     },
     /// An image could not be stored or encoded, or [`crate::Effect::GiveUp`] was heard; the job goes on without it.
     ImageFailed {
@@ -130,6 +150,8 @@ impl Event {
             Self::Submit(_)
             | Self::BlockStored { .. }
             | Self::ImageEncoded { .. }
+            | Self::JobsRecalled { .. }
+            | Self::ImageRecalled { .. }
             | Self::ImageFailed { .. }
             | Self::Command { .. } => true,
             Self::WorkerJoined { .. }

@@ -37,6 +37,7 @@ mod needs;
 mod pace;
 mod pixels;
 mod places;
+mod recall;
 mod refusal;
 mod region;
 mod roster;

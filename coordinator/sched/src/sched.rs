@@ -93,6 +93,13 @@ impl Sched {
                 reason,
             } => self.tile_failed(worker, attempt, reason, out),
             Event::ImageEncoded { image, film } => self.image_encoded(image, film, out),
+            Event::JobsRecalled { last } => self.jobs_recalled(last),
+            Event::ImageRecalled {
+                image,
+                film,
+                blocks,
+                render_time,
+            } => self.image_recalled(image, film, (blocks, render_time), out),
             Event::ImageFailed { image, reason } => self.image_failed(image, reason, out),
             Event::Command { job, command } => self.command(job, command, out),
             Event::WorkerJoined {

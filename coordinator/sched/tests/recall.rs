@@ -1,0 +1,117 @@
+//! What a store that forgot superfluous events tells a new epoch.
+
+mod situation;
+
+use model::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Span, WorkerId};
+use sched::{BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, JobState};
+use situation::{EPOCH, Farm, film, submission, tile};
+
+fn image(job: u64, image: u32) -> ImageRef {
+    ImageRef {
+        job: JobId(job),
+        image: ImageNumber(image),
+    }
+}
+
+fn recalled(job: u64, number: u32) -> Event {
+    Event::ImageRecalled {
+        image: image(job, number),
+        film: film(number),
+        blocks: 4,
+        render_time: Span::from_secs(7),
+    }
+}
+
+fn farm() -> Farm {
+    Farm::new(Config::new(EPOCH))
+}
+
+#[test]
+fn jobs_keep_their_numbers() {
+    let mut farm = farm();
+    farm.is_told(Event::JobsRecalled { last: JobId(6) })
+        .is_told(Event::Submit(submission(1, 1)))
+        .is_told(Event::JobsRecalled { last: JobId(9) })
+        .is_told(Event::JobsRecalled { last: JobId(2) })
+        .is_told(Event::Submit(submission(2, 1)));
+    let numbers: Vec<_> = farm.sched.jobs().map(|view| view.job.0).collect();
+    assert_eq!(numbers, [7, 10]);
+}
+
+#[test]
+fn an_image_that_is_recalled_is_done_and_counted() {
+    let mut farm = farm();
+    farm.job(2).is_told(recalled(1, 0)).is_told(recalled(1, 0));
+    let view = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!(view.images.encoded, 1);
+    assert_eq!(view.pixels_done * 2, view.pixels);
+    assert_eq!(
+        (view.blocks_done, view.render_time),
+        (4, Span::from_secs(7))
+    );
+    assert_eq!(view.state, JobState::Running);
+    farm.is_told(recalled(1, 1));
+    let view = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!(view.state, JobState::Over(JobOutcome::Finished));
+    assert_eq!(view.pixels_done, view.pixels);
+}
+
+#[test]
+fn a_worker_is_leased_only_what_is_not_recalled() {
+    let mut farm = farm();
+    farm.job(3).is_told(recalled(1, 1));
+    let stored = Event::BlockStored {
+        worker: WorkerId {
+            id: 0,
+            incarnation: 0,
+        },
+        block: BlockRef {
+            attempt: AttemptId {
+                epoch: Epoch(0),
+                number: 0,
+            },
+            image: image(1, 0),
+            rect: tile(0).blocks().next().unwrap(),
+        },
+        elapsed: Span::from_millis(300),
+        pixels: film(0),
+    };
+    farm.is_told(stored);
+    let view = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!(view.render_time, Span::from_millis(7_300));
+    farm.joins(1, &[]).is_told(Event::Credit {
+        worker: situation::worker(1),
+        credit: 100,
+    });
+    let leases: Vec<_> = farm
+        .never_mind()
+        .into_iter()
+        .filter_map(|effect| match effect {
+            Effect::Lease { lease, .. } => Some(lease),
+            _ => None,
+        })
+        .collect();
+    assert!(leases.iter().all(|lease| lease.image != image(1, 1)));
+    let blocks: usize = leases.iter().map(|lease| lease.blocks().count()).sum();
+    assert_eq!(blocks, 4 + 3, "two images but one block");
+}
+
+#[test]
+fn what_became_of_a_recalled_image_is_like_of_any() {
+    let mut farm = farm();
+    farm.job(1).is_told(recalled(1, 0));
+    farm.command(Command::Again(ImageNumber(0)));
+    let again = farm.sched.image(image(1, 0)).unwrap();
+    assert_eq!(again.state, ImageState::Waiting);
+    assert_eq!(farm.sched.job(JobId(1)).unwrap().pixels_done, 0);
+}
+
+#[test]
+fn the_store_forgets_nothing_that_was_not_told() {
+    let mut farm = farm();
+    farm.is_told(recalled(1, 0));
+    assert_eq!(farm.sched.jobs().count(), 0);
+    farm.job(1).command(Command::Cancel).is_told(recalled(1, 0));
+    let view = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!(view.images.encoded, 0);
+}
