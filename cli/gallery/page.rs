@@ -59,14 +59,18 @@ fn figure(page: &mut String, entry: &Entry<'_>) {
     } = entry;
     let (number, caption) = (escaped(&figure.number), escaped(&figure.caption));
     let took = duration(Duration::from_secs_f64(record.seconds));
-    let (rate, threads) = (record.rate(), record.threads);
+    let rate = record.rate();
+    let threads = match record.threads {
+        1 => "1 thread".to_owned(),
+        many => format!("{many} threads"),
+    };
     let evaluations = record.evaluations_per_ray();
     // Writing to a string cannot fail.
     let _ = write!(
         page,
         "<figure id=\"{name}\">\n<img alt=\"Figure {number}\" src=\"data:image/png;base64,{picture}\">\n\
          <figcaption><b>{number}</b> {caption}\n\
-         <p class=\"took\">{took} on {threads} threads · {rate} rays/s · {evaluations:.1} evaluations/ray</p>\n\
+         <p class=\"took\">{took} on {threads} · {rate} rays/s · {evaluations:.1} evaluations/ray</p>\n\
          <details><summary>{file}</summary><pre>{settings}{scene}</pre></details>\n\
          </figcaption>\n</figure>\n",
         name = escaped(&figure.name),

@@ -105,6 +105,10 @@ const CASCADE: Params = Params::Named(&[
     "detail",
 ]);
 
+const CELLULAR: Params = Params::Named(&[
+    "key", "norm", "density", "a1", "a2", "a3", "a4", "raised", "unbiased",
+]);
+
 ops! {
     /// The constant `value`.
     Constant = 1 "constant" () Params::Named(&["value"]) => Scalar;
@@ -192,10 +196,8 @@ ops! {
     SimplexNoise = 82 "simplex" (Vector) Params::Named(&["key"]) => Scalar;
     /// Sparse convolution noise at a, thesis eq. (4.13): `nodes` per cell, `kernel` and `scatter` by their numbers.
     SparseNoise = 83 "sparse" (Vector) Params::Named(&["key", "nodes", "kernel", "scatter"]) => Scalar;
-    /// Cellular noise at a, thesis eqs. (4.18), (4.20): Σ a_l (ψ(φ_l) − μ_l), `norm` 0 for the maximum norm.
-    CellularNoise = 84 "cellular" (Vector) Params::Named(&[
-        "key", "norm", "density", "a1", "a2", "a3", "a4", "squared", "unbiased",
-    ]) => Scalar;
+    /// Cellular noise at a, thesis eqs. (4.18), (4.20): Σ a_l (ψ(φ_l) − μ_l), `norm` 0 for the maximum norm, ψ(d) = d^(1 + `raised`).
+    CellularNoise = 84 "cellular" (Vector) CELLULAR => Scalar;
     /// Spot noise at a, thesis eq. (4.17): `nodes` per cell with `kernel`, `stretch` times as long as wide along
     /// (`x`, `y`, `z`), or along a random axis if that is 0, with radii from 1 − `variety` to 1.
     SpotNoise = 85 "spot" (Vector) Params::Named(&[
@@ -203,6 +205,8 @@ ops! {
     ]) => Scalar;
     /// Wavelet noise at a, thesis eq. (4.23).
     WaveletNoise = 86 "wavelet" (Vector) Params::Named(&["key"]) => Scalar;
+    /// Cellular noise in two dimensions: as 84 over nodes of the plane, by the first two components of a alone.
+    PlaneCellularNoise = 87 "cellular of two dimensions" (Vector) CELLULAR => Scalar;
     /// A cascade as 65 to 68 (`model` 0 to 3 in their order) over any noise, from octave `first` on;
     /// after the noise a Hurst coefficient for each octave, or none.
     Cascade = 88 "cascade" (Vector) Params::OverNoise(&[

@@ -27,6 +27,45 @@ const NODES_MAX: usize = 32;
 /// Greatest exponent of a norm; 0 stands for the maximum norm.
 pub const NORM_MAX: f64 = 16.0;
 
+/// Greatest exponent of ψ.
+pub const EXPONENT_MAX: f64 = 4.0;
+
+/// What is made of a distance, thesis §4.5.2: ψ rises, and its slope is bounded.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) enum Psi {
+    /// ψ(d) = d.
+    Plain,
+    /// ψ(d) = d².
+    Square,
+    /// ψ(d) = dᵉ, e from 1 to [`EXPONENT_MAX`]; below 1 the slope at a node would have no bound.
+    Power(f64),
+}
+
+impl Psi {
+    fn new(exponent: f64) -> Self {
+        if exponent == 1.0 {
+            Self::Plain
+        } else if exponent == 2.0 {
+            Self::Square
+        } else {
+            Self::Power(exponent)
+        }
+    }
+
+    /// ψ at a distance, and its derivative.
+    #[inline(always)]
+    fn at(self, length: f64) -> (f64, f64) {
+        match self {
+            Self::Plain => (length, 1.0),
+            Self::Square => (length * length, 2.0 * length),
+            Self::Power(e) => {
+                let slope = libm::pow(length, e - 1.0);
+                (slope * length, e * slope)
+            }
+        }
+    }
+}
+
 /// How distance is measured, thesis eq. (4.20).
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) enum Norm {
@@ -115,25 +154,32 @@ impl Norm {
         }
     }
 
-    /// The steepest slope of the length: 3^(1/p − ½) for p < 2, else 1 (ERRATA row 1596).
-    fn slope(self) -> f64 {
+    /// The steepest slope of the length: n^(1/p − ½) in n dimensions for p < 2, else 1 (ERRATA row 1596).
+    fn slope(self, planar: bool) -> f64 {
+        let axes = if planar { 2.0 } else { 3.0 };
         match self {
+            Self::One if planar => 1.414_213_563,
             Self::One => 1.732_050_808,
             Self::Two | Self::Most => 1.0,
-            Self::Other(p) if p < 2.0 => libm::pow(3.0, 1.0 / p - 0.5) * (1.0 + 1e-12),
+            Self::Other(p) if p < 2.0 => libm::pow(axes, 1.0 / p - 0.5) * (1.0 + 1e-12),
             Self::Other(_) => 1.0,
         }
     }
 
-    /// The volume of the ball of length 1: 8 Γ(1 + 1/p)³/Γ(1 + 3/p).
-    fn ball(self) -> f64 {
+    /// The volume of the ball of length 1, 8 Γ(1 + 1/p)³/Γ(1 + 3/p), or in the plane its area, 4 Γ(1 + 1/p)²/Γ(1 + 2/p).
+    fn ball(self, planar: bool) -> f64 {
         let volume = |p: f64| {
             let g = libm::tgamma(1.0 + 1.0 / p);
-            8.0 * g * g * g / libm::tgamma(1.0 + 3.0 / p)
+            if planar {
+                4.0 * g * g / libm::tgamma(1.0 + 2.0 / p)
+            } else {
+                8.0 * g * g * g / libm::tgamma(1.0 + 3.0 / p)
+            }
         };
         match self {
             Self::One => volume(1.0),
             Self::Two => volume(2.0),
+            Self::Most if planar => 4.0,
             Self::Most => 8.0,
             Self::Other(p) => volume(p),
         }
@@ -148,8 +194,9 @@ pub(crate) struct Cellular {
     weights: [f64; ORDERS],
     /// How many distances count.
     orders: usize,
-    /// ψ(d) = d² instead of d.
-    squared: bool,
+    psi: Psi,
+    /// Whether all nodes lie in a plane, over which the noise does not change: two dimensions.
+    planar: bool,
     /// Σ a_l μ_l, or 0.
     bias: f64,
     /// A cell has as many nodes as entries that its hash is not below.
@@ -167,8 +214,10 @@ pub(crate) struct Options {
     pub(crate) density: f64,
     /// a₁ to a₄.
     pub(crate) weights: [f64; ORDERS],
-    /// Whether distances are squared.
-    pub(crate) squared: bool,
+    /// The exponent of ψ.
+    pub(crate) exponent: f64,
+    /// Whether there are two dimensions.
+    pub(crate) planar: bool,
     /// Whether the mean is taken away.
     pub(crate) unbiased: bool,
 }
@@ -181,13 +230,10 @@ impl Cellular {
             .rev()
             .find(|&l| weights[l] != 0.0)
             .map_or(0, |l| l + 1);
-        let per_ball = norm.ball() * options.density;
-        let power = if options.squared {
-            2.0 / 3.0
-        } else {
-            1.0 / 3.0
-        };
-        // The cube of φ_l times the density of a ball is a gamma variable of order l.
+        let per_ball = norm.ball(options.planar) * options.density;
+        let axes = if options.planar { 2.0 } else { 3.0 };
+        let power = options.exponent / axes;
+        // The cube of φ_l (in the plane its square) times the density of a ball is a gamma variable of order l.
         let mean = |l: usize| {
             let l = [1.0, 2.0, 3.0, 4.0][l];
             libm::tgamma(l + power) / libm::tgamma(l) * libm::pow(per_ball, -power)
@@ -207,7 +253,8 @@ impl Cellular {
             norm,
             weights,
             orders,
-            squared: options.squared,
+            psi: Psi::new(options.exponent),
+            planar: options.planar,
             bias,
             counts: poisson(options.density),
             reach,
@@ -224,9 +271,14 @@ impl Cellular {
         &self.weights[..self.orders]
     }
 
-    /// Whether ψ(d) is d² instead of d.
-    pub(crate) fn squares(&self) -> bool {
-        self.squared
+    /// What is made of the distances.
+    pub(crate) fn psi(&self) -> Psi {
+        self.psi
+    }
+
+    /// Whether the noise is one of two dimensions.
+    pub(crate) fn is_planar(&self) -> bool {
+        self.planar
     }
 
     /// What is taken away from the sum.
@@ -237,13 +289,27 @@ impl Cellular {
     /// The nodes of a cell, as places within it.
     pub(crate) fn nodes(&self, cell: [u32; 3]) -> impl Iterator<Item = [f64; 3]> + use<> {
         let state = cell_state(self.lattice, cell);
-        (0..self.count(state))
-            .map(move |index| [0, 1, 2].map(|axis| f64::from(fraction(draw(state, index, axis)))))
+        let (count, axes) = if !self.planar {
+            (self.count(state), 3)
+        } else if cell[2] == 0 {
+            (self.count(state), 2)
+        } else {
+            (0, 2)
+        };
+        (0..count).map(move |index| {
+            [0, 1, 2].map(|axis| {
+                if axis < axes {
+                    f64::from(fraction(draw(state, index, axis)))
+                } else {
+                    0.0
+                }
+            })
+        })
     }
 
     /// ψ at its greatest argument.
     fn highest(&self) -> f64 {
-        if self.squared { REACH * REACH } else { REACH }
+        self.psi.at(REACH).0
     }
 
     /// All values lie between these: distances rise with their order, so the extremes have the last few at
@@ -268,34 +334,38 @@ impl Cellular {
 
     /// No slope is greater.
     pub(crate) fn slope(&self) -> f64 {
-        let psi = if self.squared { 2.0 * REACH } else { 1.0 };
-        self.total_weight() * psi * self.norm.slope()
+        self.total_weight() * self.steepest() * self.norm.slope(self.planar)
+    }
+
+    /// ψ′ at its greatest: ψ is convex.
+    fn steepest(&self) -> f64 {
+        self.psi.at(REACH).1
     }
 
     /// No value is farther from the exact one at its f32 offset: coordinates are good to 2⁻²², and the result is an f32.
     pub(crate) fn rounding(&self) -> f64 {
-        let psi = if self.squared { 2.0 * REACH } else { 1.0 };
-        (self.total_weight() * psi + self.bias.abs()) * 1e-6
+        (self.total_weight() * self.steepest() + self.bias.abs()) * 1e-6
     }
 
     /// The noise at an offset within a cell, and its gradient.
     pub(crate) fn value_gradient(&self, cell: [u32; 3], offset: [f32; 3]) -> (f32, [f32; 3]) {
-        let nearest = self.nearest(cell, offset);
         // 0, unless the place is no number.
         let nothing = 0.0 * f64::from(offset[0] + offset[1] + offset[2]);
+        let (nearest, axes) = if self.planar {
+            let flat = [cell[0], cell[1], 0];
+            (self.nearest(flat, [offset[0], offset[1], 0.0]), 2)
+        } else {
+            (self.nearest(cell, offset), 3)
+        };
         let (mut total, mut gradient) = (nothing, [0.0; 3]);
         let counting = self.weights.iter().zip(nearest).take(self.orders);
         for (&weight, (measure, d)) in counting {
             let length = self.norm.length(measure);
-            let (psi, slope) = if self.squared {
-                (length * length, 2.0 * length)
-            } else {
-                (length, 1.0)
-            };
+            let (psi, slope) = self.psi.at(length);
             total += weight * psi;
             if measure < self.reach {
                 let g = self.norm.gradient(d, length);
-                for k in 0..3 {
+                for k in 0..axes {
                     gradient[k] += weight * slope * g[k];
                 }
             }
@@ -319,9 +389,15 @@ impl Cellular {
             if i > 0 && self.norm.measure(gap(offset, step)) >= best[last].0 {
                 continue;
             }
+            if self.planar && step[2] != 0 {
+                continue;
+            }
             let state = cell_state(self.lattice, neighbour(cell, step));
             for index in 0..self.count(state) {
                 let d = [(0, 0), (1, 1), (2, 2)].map(|(k, axis)| {
+                    if self.planar && k == 2 {
+                        return 0.0;
+                    }
                     offset[k] - (fraction(draw(state, index, axis)) + f32::from(step[k]))
                 });
                 let measure = self.norm.measure(d);

@@ -50,12 +50,16 @@ impl Noise {
                 axis: unit([x, y, z]),
             }),
             (Op::WaveletNoise, []) => Self::Wavelet(lattice),
-            (Op::CellularNoise, &[norm, density, a, b, c, d, squared, unbiased]) => {
+            (
+                Op::CellularNoise | Op::PlaneCellularNoise,
+                &[norm, density, a, b, c, d, raised, unbiased],
+            ) => {
                 let options = cellular::Options {
                     norm,
                     density,
                     weights: [a, b, c, d],
-                    squared: squared != 0.0,
+                    exponent: 1.0 + raised,
+                    planar: op == Op::PlaneCellularNoise,
                     unbiased: unbiased != 0.0,
                 };
                 Self::Cellular(Box::new(Cellular::new(lattice, options)))

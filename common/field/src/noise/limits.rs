@@ -1,6 +1,6 @@
 //! What the constants of a noise may be.
 
-use super::cellular::{DENSITY_MAX, DENSITY_MIN, NORM_MAX};
+use super::cellular::{DENSITY_MAX, DENSITY_MIN, EXPONENT_MAX, NORM_MAX};
 use super::sparse::{Kernel, NODES_MAX, Scatter};
 use super::spot::{STRETCH_MAX, VARIETY_MAX};
 use crate::op::{Op, Params};
@@ -18,6 +18,7 @@ pub(crate) fn is_noise(op: Op) -> bool {
             | Op::SimplexNoise
             | Op::SparseNoise
             | Op::CellularNoise
+            | Op::PlaneCellularNoise
             | Op::SpotNoise
             | Op::WaveletNoise
     )
@@ -35,14 +36,22 @@ pub(crate) fn refused(op: Op, params: &[f64]) -> Option<Refused> {
             let uniform = Scatter::Uniform.number();
             sparse(nodes, kernel, uniform).or_else(|| spot(stretch, variety))
         }
-        (Op::CellularNoise, &[norm, density, ref weights @ .., squared, unbiased]) => {
-            cellular(norm, density, weights).or_else(|| {
-                [squared, unbiased]
-                    .into_iter()
-                    .find(|flag| *flag != 0.0 && *flag != 1.0)
-                    .map(|flag| ("0 or 1", flag))
-            })
-        }
+        (
+            Op::CellularNoise | Op::PlaneCellularNoise,
+            &[norm, density, ref weights @ .., raised, unbiased],
+        ) => cellular(norm, density, weights).or_else(|| {
+            // Fewer would too often be out of reach in the plane.
+            if op == Op::PlaneCellularNoise && density < 1.0 {
+                return Some((
+                    "a density from 1 to 8 nodes per cell in two dimensions",
+                    density,
+                ));
+            }
+            if !(0.0..=EXPONENT_MAX - 1.0).contains(&raised) {
+                return Some(("an exponent from 1 to 4", 1.0 + raised));
+            }
+            (unbiased != 0.0 && unbiased != 1.0).then_some(("0 or 1", unbiased))
+        }),
         _ => None,
     }
 }

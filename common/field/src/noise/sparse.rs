@@ -2,7 +2,8 @@
 //!
 //! The heights ξ of (4.13) have mean 0 and variance 1 but are uniform over [−√3, √3), not Gaussian: with
 //! unbounded heights the noise would have neither range nor slope bound (ERRATA, note 3 of 1782). The sum is as
-//! the thesis writes it, so its variance is the node density times ∫h²: 0.373 per node of a cell for the quintic.
+//! the thesis writes it, so its variance is the node density times ∫h²: 0.373 per node of a cell for the quintic,
+//! and 0.558 in two dimensions.
 
 use super::disc::Tile;
 use super::gradient::Lattice;
@@ -124,17 +125,20 @@ pub enum Scatter {
     ///
     /// Few nodes can be near a place, so the range and the slope bound are far smaller.
     Disc,
+    /// As `Uniform`, in two dimensions: the nodes lie in a plane, and the third coordinate counts nowhere.
+    Plane,
 }
 
 impl Scatter {
     /// Every scatter, in the order of their numbers.
-    pub const ALL: [Self; 2] = [Self::Uniform, Self::Disc];
+    pub const ALL: [Self; 3] = [Self::Uniform, Self::Disc, Self::Plane];
 
     /// The number that stands for it among a node's parameters.
     pub const fn number(self) -> f64 {
         match self {
             Self::Uniform => 0.0,
             Self::Disc => 1.0,
+            Self::Plane => 2.0,
         }
     }
 
@@ -162,6 +166,7 @@ impl Sparse {
         let sum = match self.scatter {
             Scatter::Uniform => f64::from(self.nodes) * self.kernel.range(),
             Scatter::Disc => self.kernel.disc_range(),
+            Scatter::Plane => self.most(),
         };
         f64::from(HEIGHT) * sum
     }
@@ -171,6 +176,7 @@ impl Sparse {
         let sum = match self.scatter {
             Scatter::Uniform => f64::from(self.nodes) * self.kernel.slope(),
             Scatter::Disc => self.kernel.disc_slope(),
+            Scatter::Plane => self.most() * self.kernel.steepest(),
         };
         f64::from(HEIGHT) * sum
     }
@@ -194,19 +200,35 @@ impl Sparse {
         match self.scatter {
             Scatter::Uniform => 27.0 * f64::from(self.nodes),
             Scatter::Disc => super::disc::NEAR_MAX,
+            Scatter::Plane => 9.0 * f64::from(self.nodes),
         }
     }
 
     /// The noise at an offset within a cell.
     #[inline(always)]
     pub(crate) fn at<R: Real>(&self, cell: [u32; 3], offset: [f32; 3]) -> R {
-        let q = [0, 1, 2].map(
-            #[inline(always)]
-            |axis| R::variable(offset[axis], axis),
-        );
         // 0, unless the place is no number.
         let mut total = R::constant(0.0 * (offset[0] + offset[1] + offset[2]));
+        let planar = self.scatter == Scatter::Plane;
+        let (cell, offset) = if planar {
+            ([cell[0], cell[1], 0], [offset[0], offset[1], 0.0])
+        } else {
+            (cell, offset)
+        };
+        let q = [0, 1, 2].map(
+            #[inline(always)]
+            |axis| {
+                if planar && axis == 2 {
+                    R::constant(0.0)
+                } else {
+                    R::variable(offset[axis], axis)
+                }
+            },
+        );
         for step in NEAR {
+            if planar && step[2] != 0 {
+                continue;
+            }
             let [a, b, c] = gap(offset, step);
             if a * a + b * b + c * c >= 1.0 {
                 continue;
@@ -232,6 +254,12 @@ impl Sparse {
                             index,
                             [0, 1, 2].map(|axis| fraction(draw(state, index, axis))),
                         );
+                    }
+                }
+                Scatter::Plane => {
+                    for index in 0..self.nodes {
+                        let [x, y] = [0, 1].map(|axis| fraction(draw(state, index, axis)));
+                        add(index, [x, y, 0.0]);
                     }
                 }
                 Scatter::Disc => {

@@ -135,6 +135,9 @@ fn reached(name: &str) -> (f64, f64) {
         "cellular edges" => (0.3, 0.9),
         "cellular maximum" => (0.3, 0.9),
         "cellular 4 squared" => (0.08, 0.1),
+        "cellular cubed" | "cellular maximum to 2.5" => (0.05, 0.1),
+        "cellular plane" => (0.4, 0.98),
+        "cellular plane squared" => (0.1, 0.2),
         "wavelet" => (0.2, 0.08),
         name if name.starts_with("spot") => (0.05, 0.01),
         name if name.starts_with("cellular") => (0.2, 0.5),
@@ -218,6 +221,22 @@ fn cells_wrap_at_two_to_the_32_and_differ_on_a_planet() {
         }
         assert!(noise.value_at([f64::INFINITY, 0.0, 0.0]).is_nan(), "{name}");
     }
+}
+
+#[test]
+fn noises_of_two_dimensions_do_not_change_along_the_third() {
+    let planar = all().into_iter().filter(|(name, _)| name.contains("plane"));
+    let mut count = 0;
+    for (name, noise) in planar {
+        count += 1;
+        for i in 0..2000 {
+            let [x, y, z] = place(i);
+            let (here, there) = ([x, y, z], [x, y, 0.5 * z - 7.25]);
+            assert_eq!(noise.value_at(here), noise.value_at(there), "{name}");
+            assert_eq!(noise.gradient_at(here)[2], 0.0, "{name}");
+        }
+    }
+    assert_eq!(count, 6);
 }
 
 #[test]

@@ -233,6 +233,7 @@ fn act_of(node: &Node, args: &[&Known]) -> Act {
         | Op::SimplexNoise
         | Op::SparseNoise
         | Op::CellularNoise
+        | Op::PlaneCellularNoise
         | Op::SpotNoise
         | Op::WaveletNoise => {
             let noise = Noise::new(node.op, params);

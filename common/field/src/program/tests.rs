@@ -199,6 +199,11 @@ pub(crate) fn noises() -> Vec<(String, Op, Vec<f64>)> {
             Op::SparseNoise,
             &[5.0, 1.0, kernel, 1.0],
         );
+        add(
+            &format!("plane {name}"),
+            Op::SparseNoise,
+            &[5.0, 2.0, kernel, 2.0],
+        );
     }
     add(
         "spot",
@@ -214,16 +219,26 @@ pub(crate) fn noises() -> Vec<(String, Op, Vec<f64>)> {
     let one = [1.0, 0.0, 0.0, 0.0];
     let edges = [-1.0, 1.0, 0.0, 0.0];
     let all = [0.5, -0.25, 0.125, 1.0];
-    for (name, norm, density, a, squared) in [
+    for (name, norm, density, a, raised) in [
         ("cellular", 2.0, 2.0, one, 0.0),
         ("cellular edges", 2.0, 1.0, edges, 0.0),
         ("cellular Manhattan", 1.0, 2.0, all, 0.0),
         ("cellular maximum", 0.0, 0.5, edges, 0.0),
         ("cellular 1.5", 1.5, 2.0, one, 0.0),
         ("cellular 4 squared", 4.0, 4.0, all, 1.0),
+        ("cellular cubed", 2.0, 2.0, one, 2.0),
+        ("cellular maximum to 2.5", 0.0, 2.0, edges, 1.5),
+        ("cellular plane", 2.0, 2.0, one, 0.0),
+        ("cellular plane Manhattan", 1.0, 4.0, edges, 0.0),
+        ("cellular plane squared", 2.0, 2.0, all, 1.0),
     ] {
-        let params = [5.0, norm, density, a[0], a[1], a[2], a[3], squared, 1.0];
-        add(name, Op::CellularNoise, &params);
+        let params = [5.0, norm, density, a[0], a[1], a[2], a[3], raised, 1.0];
+        let op = if name.contains("plane") {
+            Op::PlaneCellularNoise
+        } else {
+            Op::CellularNoise
+        };
+        add(name, op, &params);
     }
     list
 }

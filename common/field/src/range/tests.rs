@@ -182,8 +182,14 @@ fn every_noise_stays_within_its_ranges_along_segments() {
         let Widths { intervals, forms } = along(&name, &program, 1_000);
         // A gradient's components are known as intervals.
         let correlated = !name.starts_with("gradient of");
+        // Two ways to a node have less to correlate than three.
+        let share = if name.starts_with("cellular plane") {
+            0.85
+        } else {
+            0.7
+        };
         assert!(
-            !correlated || forms < 0.7 * intervals,
+            !correlated || forms < share * intervals,
             "{name}: affine {forms}, intervals {intervals}"
         );
     }

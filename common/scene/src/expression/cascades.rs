@@ -94,9 +94,11 @@ impl Cascade {
 const MORE: &[&str] = &["noise", "first", "power"];
 
 /// Places among the constants of a cascade over any noise.
+const MODEL: usize = 0;
 const LACUNARITY: usize = 3;
 const HURST: usize = 4;
 const OCTAVES: usize = 5;
+const GAIN: usize = 9;
 const FIRST: usize = 10;
 
 impl Cascade {
@@ -185,6 +187,15 @@ impl Shared {
         )
     }
 
+    /// The node of a cascade by its name.
+    pub(super) fn cascade_node(&self, name: &str, at: NodeId, options: &Map) -> Made<NodeId> {
+        let cascade = CASCADES.iter().find(|cascade| cascade.name == name);
+        let cascade = cascade.expect("it names one of the table");
+        let at = Operand::Vector(at).into_dynamic();
+        let made = self.cascade(cascade, &at, options)?;
+        self.scalar(name, Self::operand(name, &made)?)
+    }
+
     /// A cascade over any noise, with a Hurst coefficient for each octave if there are some.
     fn cascade_over(
         &self,
@@ -209,7 +220,11 @@ impl Shared {
         self.push(Op::Cascade, &[at], &params)
     }
 
-    /// Rescale-and-add with H varying over space (thesis §3.3.3): Σ r^{−iH(x)} basis(rⁱ x), an octave at a time.
+    /// A cascade with H varying over space (thesis §3.3.3): octaves, each a cascade of one, put together as its model
+    /// says with the weights r^{−iH(x)}.
+    ///
+    /// Where level of detail fades an octave, (3.45) and the multifractal hand on what is left of it; finer ones are
+    /// not there at all then.
     fn varying(
         &self,
         cascade: &Cascade,
@@ -218,12 +233,6 @@ impl Shared {
         hurst: &Dynamic,
     ) -> Made<NodeId> {
         let name = cascade.name;
-        if cascade.op != Op::Sum {
-            return refuse(
-                format!("`{name}: hurst` wants a constant number here, not a field"),
-                "fbm, turbulence and ridged take a Hurst coefficient that varies over space",
-            );
-        }
         let hurst = self.scalar(name, Self::operand(name, hurst)?)?;
         let params = cascade.over(options, true)?;
         let (octaves, first, lacunarity) = (params[OCTAVES], params[FIRST], params[LACUNARITY]);
@@ -237,24 +246,22 @@ impl Shared {
         let exponent = self.push(Op::Mul, &[hurst, factor], &[])?;
         let fall = self.push(Op::Exp, &[exponent], &[])?;
         let (op, constants) = Self::noise_option(name, options.get("noise"))?;
-        let mut total: Option<NodeId> = None;
+        let mut carried: Option<(NodeId, NodeId)> = None;
         let mut weight: Option<NodeId> = None;
         let mut i = 0.0;
         while i < first + octaves {
             if i >= first {
                 let mut params = params.clone();
+                // One octave of the second altitude model is one of the first: basis + ξ.
+                if cascade.op == Op::AltitudeTwo {
+                    params[MODEL] = 1.0;
+                }
                 (params[HURST], params[OCTAVES], params[FIRST]) = (0.0, 1.0, i);
                 params.push(f64::from(op.code()));
                 params.extend(&constants);
                 let octave = self.push(Op::Cascade, &[at], &params)?;
-                let term = match weight {
-                    Some(weight) => self.push(Op::Mul, &[weight, octave], &[])?,
-                    None => octave,
-                };
-                total = Some(match total {
-                    Some(total) => self.push(Op::Add, &[total, term], &[])?,
-                    None => term,
-                });
+                let gain = params[GAIN];
+                carried = Some(self.octave(cascade.op, gain, carried, weight, octave)?);
             }
             weight = Some(match weight {
                 Some(weight) => self.push(Op::Mul, &[weight, fall], &[])?,
@@ -262,7 +269,54 @@ impl Shared {
             });
             i += 1.0;
         }
-        Ok(total.expect("there is an octave"))
+        let (total, _) = carried.expect("there is an octave");
+        Ok(total)
+    }
+
+    /// Adds an octave of that weight, 1 if there is none, to a cascade: the sum, and what its model hands on.
+    fn octave(
+        &self,
+        model: Op,
+        gain: f64,
+        carried: Option<(NodeId, NodeId)>,
+        weight: Option<NodeId>,
+        octave: NodeId,
+    ) -> Made<(NodeId, NodeId)> {
+        let constant = |value: f64| self.push(Op::Constant, &[], &[value]);
+        let weighed = |node: NodeId| match weight {
+            Some(weight) => self.push(Op::Mul, &[weight, node], &[]),
+            None => Ok(node),
+        };
+        let clamped = |node: NodeId| {
+            let above = self.push(Op::Max, &[node, constant(0.0)?], &[])?;
+            self.push(Op::Min, &[above, constant(1.0)?], &[])
+        };
+        let Some((total, handed)) = carried else {
+            let handed = match model {
+                Op::AltitudeTwo => constant(1.0)?,
+                _ => octave,
+            };
+            return Ok((weighed(octave)?, handed));
+        };
+        match model {
+            Op::AltitudeOne => {
+                let raised = self.push(Op::Add, &[constant(1.0)?, weighed(octave)?], &[])?;
+                let product = self.push(Op::Mul, &[total, raised], &[])?;
+                Ok((product, handed))
+            }
+            Op::AltitudeTwo => {
+                let product = self.push(Op::Mul, &[handed, weighed(octave)?], &[])?;
+                let handed = clamped(product)?;
+                Ok((self.push(Op::Add, &[total, handed], &[])?, handed))
+            }
+            Op::RidgedMultifractal => {
+                let gained = self.push(Op::Mul, &[handed, constant(gain)?], &[])?;
+                let signal = self.push(Op::Mul, &[clamped(gained)?, octave], &[])?;
+                let total = self.push(Op::Add, &[total, weighed(signal)?], &[])?;
+                Ok((total, signal))
+            }
+            _ => Ok((self.push(Op::Add, &[total, weighed(octave)?], &[])?, handed)),
+        }
     }
 }
 

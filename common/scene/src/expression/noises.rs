@@ -33,24 +33,30 @@ const KEY: NoiseOption = NoiseOption {
     about: "Another key is another noise of the same kind, 0 to 4294967295.",
 };
 
+const DIMENSIONS: NoiseOption = NoiseOption {
+    name: "dimensions",
+    default: "3",
+    about: "3, or 2: a noise of the plane, by the place's x and y alone.",
+};
+
 pub(super) const NOISES: &[NoiseFunction] = &[
     NoiseFunction {
         name: "gradient_noise",
         op: Op::Noise,
         about: "Gradient noise (4.9), the same as noise(p, key): within 1.037.",
-        options: &[KEY],
+        options: &[KEY, DIMENSIONS],
     },
     NoiseFunction {
         name: "value_noise",
         op: Op::ValueNoise,
         about: "Value noise (4.11): within 1.",
-        options: &[KEY],
+        options: &[KEY, DIMENSIONS],
     },
     NoiseFunction {
         name: "value_gradient_noise",
         op: Op::ValueGradientNoise,
         about: "Value-gradient noise (4.12): within 2.037.",
-        options: &[KEY],
+        options: &[KEY, DIMENSIONS],
     },
     NoiseFunction {
         name: "simplex",
@@ -79,6 +85,7 @@ pub(super) const NOISES: &[NoiseFunction] = &[
                 default: "\"uniform\"",
                 about: "\"uniform\", or \"disc\": nodes keep 0.8 cells apart, which makes the slope bound far smaller.",
             },
+            DIMENSIONS,
         ],
     },
     NoiseFunction {
@@ -149,13 +156,19 @@ pub(super) const NOISES: &[NoiseFunction] = &[
             NoiseOption {
                 name: "squared",
                 default: "false",
-                about: "Whether squares of distances take their place.",
+                about: "Whether squares of distances take their place: an exponent of 2.",
+            },
+            NoiseOption {
+                name: "exponent",
+                default: "1",
+                about: "ψ(d) = d to this takes the place of each distance d (thesis §4.5.2), 1 to 4.",
             },
             NoiseOption {
                 name: "bias",
                 default: "false",
                 about: "Whether the mean is left in.",
             },
+            DIMENSIONS,
         ],
     },
 ];
@@ -181,9 +194,45 @@ impl NoiseFunction {
         }
     }
 
+    /// Whether the options ask for two dimensions.
+    fn is_planar(&self, options: &Map) -> Made<bool> {
+        let Some(value) = options.get("dimensions") else {
+            return Ok(false);
+        };
+        let name = self.name;
+        match Shared::constant(&format!("{name}: dimensions"), value)? {
+            3.0 => Ok(false),
+            2.0 => Ok(true),
+            other => refuse(
+                format!("`{name}` has 2 or 3 dimensions, not {other}"),
+                "2 is a noise of the plane: it does not change along z",
+            ),
+        }
+    }
+
+    /// Its operation and the constants of that.
+    fn made(&self, options: &Map) -> Made<(Op, Vec<f64>)> {
+        self.check_options(options)?;
+        let mut constants = self.constants(options)?;
+        let mut op = self.op;
+        if self.is_planar(options)? {
+            match op {
+                Op::CellularNoise => op = Op::PlaneCellularNoise,
+                Op::SparseNoise if options.contains_key("scatter") => {
+                    return refuse(
+                        "`sparse` has no `scatter` in two dimensions",
+                        "its nodes are scattered uniformly there",
+                    );
+                }
+                Op::SparseNoise => constants[3] = Scatter::Plane.number(),
+                _ => {}
+            }
+        }
+        Ok((op, constants))
+    }
+
     /// The constants of its operation.
     fn constants(&self, options: &Map) -> Made<Vec<f64>> {
-        self.check_options(options)?;
         let name = self.name;
         let number = |option: &str, default: f64| match options.get(option) {
             Some(value) => Shared::constant(&format!("{name}: {option}"), value),
@@ -225,7 +274,14 @@ impl NoiseFunction {
                 };
                 let mut constants = vec![key, norm, number("density", 2.0)?];
                 constants.extend(weights(name, options)?);
-                constants.push(flag(name, options, "squared", 0.0)?);
+                let squared = flag(name, options, "squared", 0.0)?;
+                if options.contains_key("squared") && options.contains_key("exponent") {
+                    return refuse(
+                        "`cellular` takes `squared` or `exponent`, not both",
+                        "squared: true is exponent: 2",
+                    );
+                }
+                constants.push(number("exponent", 1.0 + squared)? - 1.0);
                 constants.push(1.0 - flag(name, options, "bias", 0.0)?);
                 constants
             }
@@ -351,9 +407,14 @@ impl Shared {
         at: &Dynamic,
         options: &Map,
     ) -> Made<Dynamic> {
-        let at = Self::vector(noise.name, at)?;
-        let constants = noise.constants(options)?;
-        Ok(Operand::Scalar(self.push(noise.op, &[at], &constants)?).into_dynamic())
+        let mut at = Self::vector(noise.name, at)?;
+        let (op, constants) = noise.made(options)?;
+        // Noises of a lattice are those of two dimensions where it is cut through its nodes.
+        let cut = matches!(op, Op::Noise | Op::ValueNoise | Op::ValueGradientNoise);
+        if cut && noise.is_planar(options)? {
+            at = self.push(Op::OntoPlane, &[at], &[])?;
+        }
+        Ok(Operand::Scalar(self.push(op, &[at], &constants)?).into_dynamic())
     }
 
     /// The noise that an option `noise` names, alone or as a map with its `kind` and options: operation and constants.
@@ -388,8 +449,14 @@ impl Shared {
                 ),
             );
         };
-        let constants = noise.constants(&options.unwrap_or_default())?;
-        Ok((noise.op, constants))
+        let options = options.unwrap_or_default();
+        if noise.is_planar(&options)? {
+            return refuse(
+                format!("`{function}: noise` has three dimensions"),
+                "its octaves are turned against each other; take it at `base` for heights over a plane",
+            );
+        }
+        noise.made(&options)
     }
 
     /// The gradient of a noise at a place, thesis eq. (4.2).
@@ -427,12 +494,23 @@ impl Shared {
         known_options(
             function,
             options,
-            &["noise", "key", "amount", "scale", "by"],
+            &[
+                "noise",
+                "key",
+                "amount",
+                "scale",
+                "by",
+                "octaves",
+                "hurst",
+                "lacunarity",
+                "detail",
+            ],
         )?;
         let number = |option: &str, default: f64| match options.get(option) {
             Some(value) => Self::constant(&format!("warp: {option}"), value),
             None => Ok(default),
         };
+        let octaves = number("octaves", 1.0)?;
         let (amount, scale, key) = (
             number("amount", 0.5)?,
             number("scale", 1.0)?,
@@ -448,7 +526,24 @@ impl Shared {
             Some(by) => by.as_deref().map(str::to_owned).or(Some(String::new())),
         };
         let way = match way.as_deref() {
+            Some("gradient") if octaves != 1.0 => {
+                return refuse(
+                    "`warp` goes by the gradient of a single noise, not of octaves",
+                    "write by: \"vector\", or warp what is warped already",
+                );
+            }
             Some("gradient") => self.gradient_node(function, place, options)?,
+            None | Some("vector") if octaves != 1.0 => {
+                let part = |step: f64| {
+                    let mut options = options.clone();
+                    for taken in ["amount", "scale", "by"] {
+                        options.remove(taken);
+                    }
+                    options.insert("key".into(), ((key + step) % 4_294_967_296.0).into());
+                    self.cascade_node("fbm", place, &options)
+                };
+                self.push(Op::Vector, &[part(0.0)?, part(1.0)?, part(2.0)?], &[])?
+            }
             None | Some("vector") => {
                 let (op, constants) = Self::noise_option(function, options.get("noise"))?;
                 let part = |step: f64| {

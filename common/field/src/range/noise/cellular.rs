@@ -6,7 +6,7 @@
 //! Nodes that are certainly farther than enough others are never looked at.
 
 use super::Near;
-use crate::noise::cellular::{Cellular, Norm, ORDERS, REACH};
+use crate::noise::cellular::{Cellular, Norm, ORDERS, Psi, REACH};
 use crate::range::Arithmetic;
 
 /// Beyond so many cells the noise's range says as much as the distances.
@@ -17,10 +17,11 @@ const ROOM: f64 = 2e-6;
 
 /// The exact noise; `None` where it is too far or too wide.
 pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> {
+    let flat = [at[0].clone(), at[1].clone(), T::constant(0.0)];
+    let at = if cellular.is_planar() { &flat } else { at };
     let near = Near::new(at, 2, CELLS_MAX)?;
     let weights = cellular.weights();
-    let squared = cellular.squares();
-    let direct = squared && cellular.norm() == Norm::Two;
+    let direct = cellular.psi() == Psi::Square && cellular.norm() == Norm::Two;
     let cap = if direct { REACH * REACH } else { REACH };
     let mut sorted = vec![T::constant(cap); weights.len()];
     for node in candidates(cellular, &near) {
@@ -37,10 +38,10 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
     }
     let mut total = T::constant(-cellular.bias());
     for (distance, weight) in sorted.into_iter().zip(weights) {
-        let psi = if squared && !direct {
-            distance.square()
-        } else {
-            distance
+        let psi = match cellular.psi() {
+            Psi::Square if !direct => distance.square(),
+            Psi::Plain | Psi::Square => distance,
+            Psi::Power(e) => distance.max(T::constant(0.0)).power(e),
         };
         total = total.plus(psi.times(*weight));
     }

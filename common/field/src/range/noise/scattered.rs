@@ -50,6 +50,9 @@ fn nodes<T: Arithmetic>(
     rougher: f64,
     measure: impl Fn(u32, u32, [T; 3]) -> T,
 ) -> T {
+    let planar = sparse.scatter == Scatter::Plane;
+    let flat = [at[0].clone(), at[1].clone(), T::constant(0.0)];
+    let at = if planar { &flat } else { at };
     let Some(near) = Near::new(at, 1, CELLS_MAX) else {
         return T::any(range);
     };
@@ -82,6 +85,9 @@ fn nodes<T: Arithmetic>(
             continue;
         }
         let cell = near.cell(step);
+        if planar && cell[2] != 0 {
+            continue;
+        }
         let state = cell_state(sparse.lattice, cell);
         let place = |node: [f32; 3]| [0, 1, 2].map(|k| f64::from(node[k]) + f64::from(step[k]));
         match sparse.scatter {
@@ -89,6 +95,12 @@ fn nodes<T: Arithmetic>(
                 for index in 0..sparse.nodes {
                     let node = [0, 1, 2].map(|axis| fraction(draw(state, index, axis)));
                     add(state, index, place(node));
+                }
+            }
+            Scatter::Plane => {
+                for index in 0..sparse.nodes {
+                    let [x, y] = [0, 1].map(|axis| fraction(draw(state, index, axis)));
+                    add(state, index, place([x, y, 0.0]));
                 }
             }
             Scatter::Disc => {

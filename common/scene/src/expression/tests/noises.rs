@@ -1,5 +1,8 @@
 //! Noises and their options.
 
+use field::hash::{hash, unit};
+use field::{Interval, Place, Program};
+
 use super::*;
 
 #[test]
@@ -38,6 +41,19 @@ fn noises_take_options() {
         (
             "warp(p, #{amount: 2}).x",
             "(p + (vec(noise(p), noise(p), noise(p))*2)).x",
+        ),
+        (
+            "cellular(p, #{dimensions: 2, exponent: 3})",
+            "cellular of two dimensions(p)",
+        ),
+        ("sparse(p, #{dimensions: 2})", "sparse(p)"),
+        (
+            "value_noise(p, #{dimensions: 2})",
+            "value_noise(onto_plane(p))",
+        ),
+        (
+            "warp(p, #{octaves: 3, hurst: 0.5}).x",
+            "(p + (vec(fbm(p), fbm(p), fbm(p))*0.5)).x",
         ),
         (
             "warp(p, #{by: \"gradient\", scale: 3}).z",
@@ -162,8 +178,43 @@ fn mistakes_in_noises_have_sentences() {
             None,
         ),
         (
-            "altitude1(p, #{hurst: p.x})",
-            "`altitude1: hurst` wants a constant number here, not a field",
+            "cellular(p, #{exponent: 0.5})",
+            "`cellular` wants an exponent from 1 to 4, not 0.5",
+            None,
+        ),
+        (
+            "cellular(p, #{squared: true, exponent: 2})",
+            "`cellular` takes `squared` or `exponent`, not both",
+            Some("squared: true is exponent: 2"),
+        ),
+        (
+            "cellular(p, #{dimensions: 4})",
+            "`cellular` has 2 or 3 dimensions, not 4",
+            None,
+        ),
+        (
+            "cellular(p, #{dimensions: 2, density: 0.5})",
+            "`cellular of two dimensions` wants a density from 1 to 8 nodes per cell in two dimensions, not 0.5",
+            None,
+        ),
+        (
+            "sparse(p, #{dimensions: 2, scatter: \"disc\"})",
+            "`sparse` has no `scatter` in two dimensions",
+            None,
+        ),
+        (
+            "simplex(p, #{dimensions: 2})",
+            "`simplex` has no option `dimensions`",
+            None,
+        ),
+        (
+            "fbm(p, #{noise: #{kind: \"cellular\", dimensions: 2}})",
+            "`fbm: noise` has three dimensions",
+            None,
+        ),
+        (
+            "warp(p, #{by: \"gradient\", octaves: 3}).x",
+            "`warp` goes by the gradient of a single noise, not of octaves",
             None,
         ),
         (
@@ -193,5 +244,44 @@ fn mistakes_in_noises_have_sentences() {
         if help.is_some() {
             assert_eq!(refusal.help.as_deref(), help, "{text}");
         }
+    }
+}
+
+/// Where H is the same everywhere it makes no difference that it could vary.
+#[test]
+fn a_hurst_coefficient_that_varies_agrees_with_one_that_does_not() {
+    for call in [
+        "fbm(3*p, #{octaves: 4, HURST})",
+        "turbulence(3*p, #{octaves: 4, first: 2, HURST})",
+        "ridged(3*p, #{octaves: 3, HURST, noise: \"sparse\"})",
+        "altitude1(3*p, #{octaves: 5, xi: 0.4, HURST})",
+        "altitude2(3*p, #{octaves: 5, xi: 0.4, HURST, basis: \"ridged\"})",
+        "ridged_multifractal(3*p, #{octaves: 5, offset: 0.9, gain: 1.7, HURST})",
+    ] {
+        let values = |hurst: &str| {
+            let fields = fields();
+            let root = fields.field(&call.replace("HURST", hurst)).unwrap();
+            let graph = fields.into_graph();
+            let program = Program::compile(&graph, &[root], Interval::point(0.0)).unwrap();
+            let at = |i: u32| {
+                let p = [0, 1, 2].map(|axis| 8.0 * unit(hash(&[i, axis])) - 4.0);
+                program.at(&Place {
+                    at: p,
+                    time: 0.0,
+                    footprint: 0.01,
+                })
+            };
+            (0..500).map(at).collect::<Vec<f64>>()
+        };
+        let (even, varying) = (values("hurst: 0.7"), values("hurst: 0.7 + 0*p.x"));
+        for (a, b) in even.iter().zip(&varying) {
+            assert!((a - b).abs() < 1e-6, "{call}: {a} {b}");
+        }
+        let other = values("hurst: 0.7 + 0.2*sin(p.x)");
+        let moved = even
+            .iter()
+            .zip(&other)
+            .filter(|(a, b)| (*a - *b).abs() > 1e-3);
+        assert!(moved.count() > 250, "{call}");
     }
 }
