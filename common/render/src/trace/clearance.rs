@@ -199,7 +199,8 @@ pub(crate) struct Around<'a> {
 }
 
 impl Clearances {
-    /// Tables for distances from about `nearest` metres on; below that the first table serves.
+    /// Tables for distances from about `nearest` metres to the farthest place of the bound; nearer and beyond the
+    /// first table serves.
     pub(crate) fn new(around: &Around<'_>, nearest: f64) -> Self {
         let known = match around.rest {
             Some(_) => Known::of_seed(around.seed),
@@ -208,7 +209,8 @@ impl Clearances {
         let mut tables = vec![around.table(0.0, FAR, f64::INFINITY)];
         let first = exponent(nearest);
         if around.footprint.angle > 0.0 && Technique::Distances.is_used(around.without) {
-            for exponent in first..exponent(FAR) {
+            let last = exponent(around.farthest());
+            for exponent in first..=last {
                 let distance = power(exponent);
                 tables.push(around.table(distance / 2.0, distance * 4.0, distance / 2.0));
             }
@@ -224,8 +226,9 @@ impl Clearances {
     #[inline]
     pub(crate) fn at(&self, distance: f64) -> &Clearance {
         let index = exponent(distance) - self.first + 1;
-        let last = self.tables.len() - 1;
-        &self.tables[usize::try_from(index).unwrap_or(0).min(last)]
+        let index = usize::try_from(index).unwrap_or(0);
+        let index = if index < self.tables.len() { index } else { 0 };
+        &self.tables[index]
     }
 }
 
@@ -254,6 +257,24 @@ impl Around<'_> {
             }
             _ => Clearance::new(&whole, 0.0, tangent, reach),
         }
+    }
+
+    /// No place of the widened bound is farther from the eye at any instant, nor are more than [`FAR`] worth tables.
+    fn farthest(&self) -> f64 {
+        let farthest = match widened(self.bound) {
+            Bound::Slab { .. } => FAR,
+            Bound::Shell { outer, .. } => outer + self.eye.length(),
+            Bound::Box { min, max } => {
+                let corner = [0, 1, 2].map(|axis| {
+                    let eye = self.eye[axis];
+                    let (low, high) = ((min[axis] - eye).abs(), (max[axis] - eye).abs());
+                    if low > high { low } else { high }
+                });
+                DVec3::from(corner).length()
+            }
+        };
+        let farthest = (farthest + self.travel) * (1.0 + ROOM);
+        if farthest < FAR { farthest } else { FAR }
     }
 
     /// The part of the widened bound that is no farther from the eye than `far`, or more.
