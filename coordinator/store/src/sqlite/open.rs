@@ -77,6 +77,11 @@ fn hold(path: &Path) -> Result<Connection, StoreError> {
     let explain = |error| explain(path, error);
     let flags = OpenFlags::SQLITE_OPEN_READ_WRITE | OpenFlags::SQLITE_OPEN_NO_MUTEX;
     let mut connection = Connection::open_with_flags(path, flags).map_err(explain)?;
+    // SQLite opens for reading what it may not write, and then fails to lock it.
+    if connection.is_readonly("main").map_err(explain)? {
+        let path = path.to_owned();
+        return Err(StoreError::ReadOnly { path });
+    }
     connection.set_prepared_statement_cache_capacity(STATEMENTS);
     // Whoever has it open will not be done soon: it is another coordinator.
     connection
@@ -97,11 +102,6 @@ fn hold(path: &Path) -> Result<Connection, StoreError> {
         let (path, known) = (path.to_owned(), schema::VERSION);
         return Err(StoreError::TooNew { path, found, known });
     }
-    if connection.is_readonly("main").map_err(explain)? {
-        let path = path.to_owned();
-        return Err(StoreError::ReadOnly { path });
-    }
-
     let mode: String = connection
         .query_row("PRAGMA journal_mode = WAL", [], |row| row.get(0))
         .map_err(|error| opening(path, error))?;
