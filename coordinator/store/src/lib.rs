@@ -11,6 +11,7 @@
 
 mod entry;
 mod error;
+mod events;
 mod memory;
 mod recalled;
 mod sqlite;

@@ -1,5 +1,7 @@
 //! What a file may meet: a full disk, one that cannot be written, damage, another version, another program, and death.
 
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on fails")]
+
 mod sample;
 
 use std::fs::{self, File, OpenOptions};

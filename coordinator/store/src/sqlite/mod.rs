@@ -3,7 +3,7 @@
 //! Write-ahead log, synced at each commit (`synchronous = FULL`). The file is
 //! locked for as long as it is open, so that no other program changes it. After each 1,000 pages
 //! the log is copied back and begun anew; pages of what is deleted are used again, so
-//! the file is as large as the most that was ever there at a time. [`schema`] says what a row means.
+//! the file is as large as the most that was ever there at a time. `v1.sql` says what a row means.
 
 mod open;
 mod read;

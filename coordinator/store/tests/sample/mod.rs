@@ -34,7 +34,7 @@ pub(crate) fn submission(number: u64) -> Submission {
         name: format!("flight {number}"),
         scene: digest(7),
         revision: Revision(12),
-        frames: FrameRange::new(3, 9, 1).unwrap(),
+        frames: FrameRange::new(3, 9, 1).expect("there are some"),
         window: Rect {
             x0: 0,
             y0: 0,

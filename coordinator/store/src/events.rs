@@ -1,0 +1,123 @@
+//! What a scheduler of a later epoch must be told.
+
+use std::collections::BTreeSet;
+
+use model::{AttemptId, Epoch, ImageRef, JobId, WorkerId};
+use sched::{BlockRef, Command, Event, Submission};
+
+use crate::{Recalled, RecalledBlock, RecalledImage, RecalledJob};
+
+/// Whose the recalled blocks are: nobody's that is known any more.
+const NOBODY: WorkerId = WorkerId {
+    id: 0,
+    incarnation: 0,
+};
+
+/// The attempt of the recalled blocks, which is of no epoch that there was.
+const LONG_AGO: AttemptId = AttemptId {
+    epoch: Epoch(0),
+    number: 0,
+};
+
+impl Recalled {
+    /// The events that bring everything back, in order, each with when it happened by the coordinator's calendar,
+    /// in milliseconds since 1970.
+    ///
+    /// Job by job: its number, its submission, its commands, its images that are over, its blocks, and that
+    /// it was cancelled. The blocks of an image come in one run. Effects of these events are those of
+    /// any others; the acknowledgements among them are for nobody. The last event tells the largest job number.
+    pub fn events(&self) -> impl Iterator<Item = (u64, Event)> {
+        let kept: BTreeSet<JobId> = self.jobs.iter().map(|job| job.job).collect();
+        let end = self.jobs.last().map_or(0, |job| job.unix_ms);
+        let last = Event::JobsRecalled {
+            last: self.last_job,
+        };
+        let of_jobs = self.jobs.iter().flat_map(move |job| job.events(&kept));
+        of_jobs.chain(std::iter::once((end, last)))
+    }
+}
+
+impl RecalledJob {
+    fn events(&self, kept: &BTreeSet<JobId>) -> impl Iterator<Item = (u64, Event)> + use<'_> {
+        let job = self.job;
+        let before = Event::JobsRecalled {
+            last: JobId(job.0.saturating_sub(1)),
+        };
+        let after = self.submission.after.iter().copied();
+        let submit = Event::Submit(Submission {
+            // One that is gone was finished: a job that others wait for is not forgotten.
+            after: after.filter(|after| kept.contains(after)).collect(),
+            ..self.submission.clone()
+        });
+        // Before the images, since a job that is over takes no such command.
+        let pause = self.paused.then_some(Command::Pause);
+        let focus = self.focus.map(|focus| Command::Focus(Some(focus)));
+        let commands = pause.into_iter().chain(focus);
+        let told = move |command| (self.unix_ms, Event::Command { job, command });
+        let cancel = self.cancelled_unix_ms.map(|unix_ms| {
+            let command = Command::Cancel;
+            (unix_ms, Event::Command { job, command })
+        });
+        [(self.unix_ms, before), (self.unix_ms, submit)]
+            .into_iter()
+            .chain(commands.map(told))
+            .chain(self.images.iter().map(move |image| image.event(job)))
+            .chain(
+                self.blocks
+                    .iter()
+                    .map(move |block| (self.unix_ms, block.event(job))),
+            )
+            .chain(cancel)
+    }
+}
+
+impl RecalledImage {
+    fn event(&self, job: JobId) -> (u64, Event) {
+        let image = ImageRef {
+            job,
+            image: self.image(),
+        };
+        match self {
+            Self::Encoded {
+                unix_ms,
+                film,
+                blocks,
+                render_time,
+                ..
+            } => {
+                let (film, blocks, render_time) = (*film, *blocks, *render_time);
+                let event = Event::ImageRecalled {
+                    image,
+                    film,
+                    blocks,
+                    render_time,
+                };
+                (*unix_ms, event)
+            }
+            Self::Failed {
+                unix_ms, reason, ..
+            } => {
+                let reason = reason.clone();
+                (*unix_ms, Event::ImageFailed { image, reason })
+            }
+        }
+    }
+}
+
+impl RecalledBlock {
+    fn event(&self, job: JobId) -> Event {
+        Event::BlockStored {
+            worker: NOBODY,
+            block: BlockRef {
+                attempt: LONG_AGO,
+                image: ImageRef {
+                    job,
+                    image: self.image,
+                },
+                rect: self.rect,
+            },
+            elapsed: self.elapsed,
+            pixels: self.pixels,
+        }
+    }
+}
