@@ -67,7 +67,10 @@ pub enum Entry {
         /// Why.
         reason: String,
     },
-    /// A user wanted something of a job, and got it.
+    /// A user wanted something of a job, and got it: a command that was refused is not told.
+    ///
+    /// As in the scheduler, [`Command::Cancel`] changes nothing where every image is over, so that
+    /// those that failed can be retried afterwards.
     Command {
         /// The job.
         job: JobId,

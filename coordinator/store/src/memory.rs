@@ -218,6 +218,7 @@ impl Job {
         match command {
             Command::Pause => self.paused = true,
             Command::Resume => self.paused = false,
+            Command::Cancel if self.is_over() => {}
             Command::Cancel => {
                 self.cancelled_unix_ms = Some(unix_ms);
                 self.blocks.clear();
@@ -235,6 +236,10 @@ impl Job {
             // The whole job is gone already.
             Command::Remove => {}
         }
+    }
+
+    fn is_over(&self) -> bool {
+        self.images.len() >= self.submission.frames.count() as usize
     }
 
     fn recalled(&self, job: JobId) -> RecalledJob {

@@ -309,6 +309,21 @@ fn a_cancelled_job_keeps_its_frames_alone(mut store: impl Crash) {
     assert_eq!(job.log.len(), 1);
 }
 
+fn cancelling_a_job_that_is_over_changes_nothing(mut store: impl Crash) {
+    let mut over: Vec<Entry> = vec![submitted(1), failed(1, 3)];
+    over.extend((4..9).map(|number| encoded(1, number)));
+    let retried = [
+        wants(1, Command::Cancel),
+        wants(1, Command::Retry),
+        block(1, 3, 0),
+    ];
+    store.commit(&over).unwrap();
+    store.commit(&retried).unwrap();
+    let job = only(&mut store.crash());
+    assert_eq!(job.cancelled_unix_ms, None);
+    assert_eq!((job.images.len(), job.blocks.len()), (5, 1));
+}
+
 fn what_is_forgotten_is_gone_but_for_its_number(mut store: impl Crash) {
     for forget in [
         Entry::Forgotten { job: JobId(7) },
@@ -383,6 +398,7 @@ for_every_store! {
     retry_and_again_make_images_nothing
     commands_change_the_job
     a_cancelled_job_keeps_its_frames_alone
+    cancelling_a_job_that_is_over_changes_nothing
     what_is_forgotten_is_gone_but_for_its_number
     a_log_is_bounded
 }

@@ -214,9 +214,12 @@ impl Writer<'_> {
             Command::Resume => self.run("UPDATE jobs SET paused = 0 WHERE job = ?1", [id]),
             Command::Cancel => {
                 self.run(
-                    "UPDATE jobs SET cancelled_unix_ms = ?2 WHERE job = ?1",
+                    "UPDATE jobs SET cancelled_unix_ms = ?2 WHERE job = ?1
+                         AND (SELECT count(*) FROM images WHERE images.job = ?1)
+                             < (frames_end - frames_start + frames_step - 1) / frames_step",
                     [id, int(unix_ms)],
                 )?;
+                // Where every image is over there are none.
                 self.run("DELETE FROM blocks WHERE job = ?1", [id])
             }
             Command::Retry => self.run(
