@@ -3,46 +3,16 @@
 use std::collections::BTreeMap;
 
 use model::{Span, Timestamp, WorkerId};
-use sched::{LinkId, TileShape};
+use sched::LinkId;
 use session::Event;
 
-use crate::coordinator::{self, Coordinator, Down, Later, Up};
+use crate::coordinator::{self, Coordinator, Later};
+use crate::disk::Pixels;
+use crate::message::{Down, Up};
+use crate::plan::{Plan, Troubles};
 use crate::random::Random;
+use crate::user::User;
 use crate::worker::{self, Worker};
-
-/// How often things go wrong, in so many of 1,000 cases.
-#[derive(Clone, Copy)]
-pub(crate) struct Troubles {
-    /// A message comes a second time, later.
-    pub(crate) repeats: u64,
-    /// In a second of the farm, a link is cut.
-    pub(crate) cuts: u64,
-    /// In a second of the farm, a worker is killed.
-    pub(crate) kills: u64,
-    /// In a second of the farm, a worker is frozen, longer than its limit or not.
-    pub(crate) freezes: u64,
-    /// In a second of the farm, a worker is drained or stopped.
-    pub(crate) leaves: u64,
-    /// In a second of the farm, the coordinator is frozen.
-    pub(crate) pauses: u64,
-    /// A block arrives at a full disk.
-    pub(crate) refusals: u64,
-    /// A tile fails.
-    pub(crate) failures: u64,
-}
-
-impl Troubles {
-    pub(crate) const NONE: Self = Self {
-        repeats: 0,
-        cuts: 0,
-        kills: 0,
-        freezes: 0,
-        leaves: 0,
-        pauses: 0,
-        refusals: 0,
-        failures: 0,
-    };
-}
 
 /// Something that will happen.
 #[derive(Clone, Debug)]
@@ -59,6 +29,11 @@ enum Happening {
     Closed(WorkerId, u64),
     Disk(Later),
     Rendered(WorkerId, usize, Span),
+    /// The coordinator starts again.
+    Restart,
+    /// There is room on the disk again.
+    Room,
+    /// A second has passed.
     Trouble,
 }
 
@@ -74,8 +49,10 @@ type Stream = (u64, &'static str);
 
 pub(crate) struct Farm {
     pub(crate) coordinator: Coordinator,
-    pub(crate) blocks_rendered: u64,
+    user: User,
     workers: BTreeMap<WorkerId, Worker>,
+    /// Events of workers that are gone.
+    events: u64,
     /// The link of each worker, as the network sees it.
     links: BTreeMap<WorkerId, u64>,
     links_made: u64,
@@ -86,28 +63,26 @@ pub(crate) struct Farm {
     now: Timestamp,
     streams: BTreeMap<Stream, Timestamp>,
     paused_until: Timestamp,
+    /// Nobody is reached before.
+    parted_until: BTreeMap<WorkerId, Timestamp>,
     troubles: Troubles,
     random: Random,
 }
 
+/// After so long nothing goes wrong any more…
+const TROUBLED: Span = Span::from_secs(1_200);
+
+/// …and after so long everything must be done.
+const END: Span = Span::from_secs(4 * 3_600);
+
 impl Farm {
-    /// A farm of up to five workers and a job, both drawn from the key.
-    pub(crate) fn new(key: u64, troubles: Troubles) -> Self {
-        let mut random = Random::new(key);
-        let images = 1 + u32::try_from(random.below(6)).expect("it is small");
-        let shapes = [(64, 64), (40, 60), (200, 25), (200, 150)];
-        let (width, height) = shapes[usize::try_from(random.below(4)).expect("it is small")];
-        let tiles = match random.below(4) {
-            0 => TileShape::Rule {
-                min_tile_pixels: None,
-            },
-            1 => TileShape::Time { aim: None },
-            _ => TileShape::Size { width, height },
-        };
+    pub(crate) fn new(plan: Plan) -> Self {
+        let mut random = Random::new(plan.key);
         let mut farm = Self {
-            coordinator: Coordinator::new(images, tiles),
-            blocks_rendered: 0,
+            coordinator: Coordinator::new(plan),
+            user: User::new(&plan, &mut random),
             workers: BTreeMap::new(),
+            events: 0,
             links: BTreeMap::new(),
             links_made: 0,
             incarnations: 0,
@@ -116,32 +91,50 @@ impl Farm {
             now: Timestamp(0),
             streams: BTreeMap::new(),
             paused_until: Timestamp(0),
-            troubles,
+            parted_until: BTreeMap::new(),
+            troubles: plan.troubles,
             random,
         };
-        for id in 0..1 + farm.random.below(5) {
+        for id in 0..plan.workers {
             farm.hire(id, Span(0));
         }
-        farm.plan(Span::from_secs(1), Happening::Trouble);
+        farm.plan(Span(0), Happening::Trouble);
         farm
     }
 
-    /// Lets the farm work until the job is over, or until `end`; then the workers are
-    /// told to stop, and everything must come to rest.
-    pub(crate) fn run(&mut self, end: Span) {
-        while !self.coordinator.is_done() && self.now.0 < end.0 && self.step() {}
+    /// Events that the scheduler and the sessions were told.
+    pub(crate) fn events(&self) -> u64 {
+        let here: u64 = self.workers.values().map(|worker| worker.events).sum();
+        self.coordinator.events + self.events + here
+    }
+
+    fn is_done(&self) -> bool {
+        self.coordinator.is_up && self.user.is_content(&self.coordinator.sched)
+    }
+
+    /// Lets the farm work until its jobs are over; then the workers are told to stop, and everything
+    /// must come to rest.
+    pub(crate) fn run(&mut self) {
+        while !self.is_done() && self.step() {
+            assert!(self.now.0 < END.0, "every job ends: {:?}", self.user);
+            if self.now.0 > TROUBLED.0 {
+                self.troubles = Troubles::NONE;
+            }
+        }
+        assert!(self.is_done(), "something goes on");
         self.troubles = Troubles::NONE;
         for id in self.workers.keys().copied().collect::<Vec<_>>() {
             self.tell_worker(id, Event::StopAsked);
         }
         // The longest freeze that is drawn is 100 s.
-        let rest = self.now + Span::from_secs(200);
+        let rest = self.now + Span::from_secs(300);
         while self.now < rest && self.step() {}
-        if self.coordinator.is_done() {
-            assert!(self.workers.is_empty(), "whoever is asked to stop does");
-            assert_eq!(self.coordinator.sched.workers().count(), 0);
-            assert_eq!(self.coordinator.sched.next_deadline(), None);
-        }
+        assert!(self.workers.is_empty(), "whoever is asked to stop does");
+        assert!(self.coordinator.is_up && self.coordinator.is_at_rest());
+        assert_eq!(self.coordinator.sched.workers().count(), 0);
+        assert_eq!(self.coordinator.disk.images(), [], "scratch files are gone");
+        self.coordinator.sched.check_invariants();
+        self.user.looks_at(&self.coordinator);
     }
 
     /// Lives through what comes next; says whether anything did.
@@ -167,7 +160,7 @@ impl Farm {
 
     /// Whose deadline is next; whoever is frozen looks at the clock later.
     fn next_tick(&self) -> Option<(Timestamp, Clock)> {
-        let coordinator = self.coordinator.sched.next_deadline();
+        let coordinator = self.coordinator.next_deadline();
         let coordinator = coordinator.map(|due| (due.max(self.paused_until), Clock::Coordinator));
         let workers = self.workers.iter().filter_map(|(&id, worker)| {
             let due = worker.session.next_deadline()?;
@@ -208,7 +201,11 @@ impl Farm {
                     self.worker_hears(id, message);
                 }
             }
-            Happening::Up(id, link, message) => self.coordinator_hears(id, link, message),
+            Happening::Up(id, link, message) => {
+                self.coordinator.hears(self.now, id, link, message);
+            }
+            Happening::Restart => self.coordinator.restart(self.now),
+            Happening::Room => self.coordinator.disk.is_full = false,
             Happening::Closed(worker, link) => {
                 let link = LinkId(link);
                 let event = sched::Event::LinkClosed { worker, link };
@@ -235,7 +232,7 @@ impl Farm {
             Happening::Up(..) | Happening::Closed(..) | Happening::Disk(_) => {
                 Some(self.paused_until)
             }
-            Happening::Trouble => None,
+            Happening::Restart | Happening::Room | Happening::Trouble => None,
         };
         let time = time.max(frozen_until.unwrap_or_default());
         self.planned += 1;
@@ -260,8 +257,15 @@ impl Farm {
             incarnation: self.incarnations,
         };
         let threads = 1 + u32::try_from(self.random.below(3)).expect("it is small");
-        let pace = Span::from_millis(20 + self.random.below(400));
-        self.workers.insert(id, Worker::new(id, threads, pace));
+        let slower = if self.random.happens(self.troubles.slow) {
+            10
+        } else {
+            1
+        };
+        let pace = Span::from_millis(20 + self.random.below(400)).times(slower);
+        let mut worker = Worker::new(id, threads, pace);
+        worker.lies = self.random.happens(self.troubles.liars);
+        self.workers.insert(id, worker);
         self.plan(after, Happening::Start(id));
     }
 
@@ -280,18 +284,15 @@ impl Farm {
 
     fn worker_renders(&mut self, id: WorkerId, thread: usize, took: Span) {
         let fails = self.random.happens(self.troubles.failures);
+        let lies = self.random.below(2) == 0;
         if let Some(worker) = self.workers.get_mut(&id) {
-            worker.renders(self.now, thread, took, fails);
+            let pixels = if worker.lies && lies {
+                Pixels::Wrong
+            } else {
+                Pixels::Right
+            };
+            worker.renders(self.now, thread, took, (!fails).then_some(pixels));
         }
-    }
-
-    fn coordinator_hears(&mut self, id: WorkerId, link: u64, message: Up) {
-        if let Up::Block(block, _) = &message
-            && self.random.happens(self.troubles.refusals)
-        {
-            return self.coordinator.refuses_for_now(id, *block);
-        }
-        self.coordinator.hears(self.now, id, link, message);
     }
 
     /// Grants what the shells wish for, until nobody wishes for anything.
@@ -299,11 +300,12 @@ impl Farm {
         for wish in self.coordinator.wishes() {
             match wish {
                 coordinator::Wish::Send(id, message) => self.send_down(id, message),
-                coordinator::Wish::Disk(later) => {
-                    let took = self.random.span(Span::from_millis(5));
+                coordinator::Wish::Disk(later, mean) => {
+                    let took = self.random.span(mean);
                     self.plan(took, Happening::Disk(later));
                 }
                 coordinator::Wish::Close(id) => self.cut(id),
+                coordinator::Wish::Tell(submission, job) => self.user.hears(submission, job),
             }
         }
         for id in self.workers.keys().copied().collect::<Vec<_>>() {
@@ -330,7 +332,12 @@ impl Farm {
                 self.links_made += 1;
                 self.links.insert(id, self.links_made);
                 let took = self.random.span(Span::from_millis(20));
+                let parted = self
+                    .parted_until
+                    .get(&id)
+                    .is_some_and(|&until| until > self.now);
                 let happening = match self.random.below(10) {
+                    _ if parted || !self.coordinator.is_up => Happening::Lost(id, self.links_made),
                     0 if self.troubles.cuts > 0 => Happening::Lost(id, self.links_made),
                     _ => Happening::Dialled(id, self.links_made),
                 };
@@ -408,12 +415,12 @@ impl Farm {
     /// A worker's process is over; its goodbye is on its way, if it said one.
     fn dismiss(&mut self, id: WorkerId) {
         if let Some(worker) = self.workers.remove(&id) {
-            self.blocks_rendered += worker.blocks_rendered;
+            self.events += worker.events;
             assert!(worker.blocks_kept() <= 12);
             if let Some(link) = self.links.remove(&id) {
                 self.plan(Span::from_secs(1), Happening::Closed(id, link));
             }
-            if !self.coordinator.is_done() {
+            if !self.is_done() {
                 let after = self.random.span(Span::from_secs(3));
                 self.hire(id.id, after);
             }
@@ -447,13 +454,73 @@ impl Farm {
                 self.kill(id);
             }
         }
-        if self.random.happens(self.troubles.pauses) {
+        self.trouble_coordinator();
+        if self.coordinator.is_up {
+            let wishes = self.random.happens(self.troubles.wishes);
+            for event in self
+                .user
+                .wants(&self.coordinator.sched, wishes, &mut self.random)
+            {
+                self.coordinator.tell(self.now, event);
+            }
+            if self.now > self.paused_until + Span::from_secs(1) {
+                let sched = &self.coordinator.sched;
+                self.coordinator.witness.check_leases(self.now, sched);
+            }
+        }
+        if !self.is_done() {
+            self.plan(Span::from_secs(1), Happening::Trouble);
+        }
+    }
+
+    fn trouble_coordinator(&mut self) {
+        let troubles = self.troubles;
+        if self.random.happens(troubles.partitions) {
+            let until = self.now + self.random.span(Span::from_secs(6));
+            for id in self.workers.keys().copied().collect::<Vec<_>>() {
+                if self.random.below(2) == 0 {
+                    self.parted_until.insert(id, until);
+                    self.cut(id);
+                }
+            }
+        }
+        if self.random.happens(troubles.pauses) {
             self.paused_until = self.now + self.random.span(Span::from_secs(5));
             self.plan_all_anew();
         }
-        if !self.coordinator.is_done() {
-            self.plan(Span::from_secs(1), Happening::Trouble);
+        if self.random.happens(troubles.jumps) {
+            let back = self.random.below(4) == 0;
+            let jump = self.random.span(Span::from_secs(10)).0;
+            let skew = self.coordinator.skew;
+            self.coordinator.skew = if back {
+                skew.saturating_sub(1_000_000)
+            } else {
+                skew + jump
+            };
         }
+        if self.random.happens(troubles.fulls) && !self.coordinator.disk.is_full {
+            self.coordinator.disk.is_full = true;
+            let full = self.random.span(Span::from_secs(8));
+            self.plan(full, Happening::Room);
+        }
+        if self.coordinator.is_up && self.random.happens(troubles.crashes) {
+            self.crash();
+        }
+    }
+
+    /// The coordinator's machine loses its power, and what was on its way to it or planned by it.
+    fn crash(&mut self) {
+        self.coordinator.crash(&mut self.random);
+        self.agenda
+            .retain(|_, happening| !matches!(happening, Happening::Disk(_)));
+        for id in self.links.keys().copied().collect::<Vec<_>>() {
+            self.cut(id);
+        }
+        // It remembers no link that it could hear the end of.
+        self.agenda
+            .retain(|_, happening| !matches!(happening, Happening::Closed(..) | Happening::Up(..)));
+        let down = self.random.span(Span::from_secs(3));
+        self.plan(down, Happening::Restart);
     }
 
     /// The process is gone at once; whether anybody notices is a matter of luck.
@@ -468,7 +535,7 @@ impl Farm {
         }
 
         if let Some(worker) = self.workers.remove(&id) {
-            self.blocks_rendered += worker.blocks_rendered;
+            self.events += worker.events;
         }
         let after = self.random.span(Span::from_secs(3));
         self.hire(id.id, after);

@@ -6,7 +6,8 @@ use model::{AttemptId, ImageRef, Lease, Rect, Span, Timestamp, WorkerId};
 use sched::BlockRef;
 use session::{Backoff, Config, Effect, Event, Session};
 
-use crate::coordinator::{Down, Up};
+use crate::disk::Pixels;
+use crate::message::{Down, Up};
 
 /// What the shell wants of the world.
 #[derive(Debug)]
@@ -30,10 +31,12 @@ pub(crate) struct Worker {
     queue: VecDeque<Lease>,
     paused: bool,
     /// The bytes of blocks, so to say, and how long they took.
-    kept: BTreeMap<(AttemptId, Rect), (ImageRef, Span)>,
+    kept: BTreeMap<(AttemptId, Rect), (ImageRef, Span, Pixels)>,
     /// Every tile that was started.
     started: BTreeSet<AttemptId>,
-    pub(crate) blocks_rendered: u64,
+    pub(crate) events: u64,
+    /// Whether it makes wrong pixels now and then.
+    pub(crate) lies: bool,
     wishes: Vec<Wish>,
 }
 
@@ -67,7 +70,8 @@ impl Worker {
             paused: false,
             kept: BTreeMap::new(),
             started: BTreeSet::new(),
-            blocks_rendered: 0,
+            events: 0,
+            lies: false,
             wishes: Vec::new(),
         }
     }
@@ -93,22 +97,28 @@ impl Worker {
         self.tell(now, event);
     }
 
-    /// A thread has rendered the block it had in hand.
-    pub(crate) fn renders(&mut self, now: Timestamp, thread: usize, took: Span, fails: bool) {
+    /// A thread has rendered the block it had in hand, or failed to.
+    pub(crate) fn renders(
+        &mut self,
+        now: Timestamp,
+        thread: usize,
+        took: Span,
+        made: Option<Pixels>,
+    ) {
         let Some(tile) = self.threads[thread].as_mut().filter(|tile| tile.busy) else {
             return;
         };
         tile.busy = false;
         let attempt = tile.attempt;
-        if fails {
+        let Some(pixels) = made else {
             self.threads[thread] = None;
             let reason = "out of memory".into();
-            self.tell(now, Event::RenderFailed { attempt, reason });
-        } else if let Some(rect) = tile.blocks.pop_front() {
+            return self.tell(now, Event::RenderFailed { attempt, reason });
+        };
+        if let Some(rect) = tile.blocks.pop_front() {
             let image = tile.image;
             let is_last = tile.blocks.is_empty();
-            self.blocks_rendered += 1;
-            self.kept.insert((attempt, rect), (image, took));
+            self.kept.insert((attempt, rect), (image, took, pixels));
             assert!(
                 self.kept.len() <= self.config.unacked_blocks_max as usize,
                 "rendering pauses in time"
@@ -126,6 +136,7 @@ impl Worker {
 
     pub(crate) fn tell(&mut self, now: Timestamp, event: Event) {
         let mut effects = Vec::new();
+        self.events += 1;
         self.session.handle(now, event, &mut effects);
         self.session.check_invariants();
         for effect in effects {
@@ -157,13 +168,13 @@ impl Worker {
             }
             Effect::SendBlock { attempt, rect } => {
                 let kept = self.kept.get(&(attempt, rect));
-                let (image, took) = *kept.expect("the bytes of a block to send are kept");
+                let (image, took, pixels) = *kept.expect("the bytes of a block to send are kept");
                 let block = BlockRef {
                     attempt,
                     image,
                     rect,
                 };
-                Up::Block(block, took)
+                Up::Block(block, took, pixels)
             }
             Effect::DropBlock { attempt, rect } => {
                 self.kept.remove(&(attempt, rect));

@@ -1,0 +1,90 @@
+//! A whole farm in one thread: the scheduler, its store and disk, several sessions, and a simulated
+//! network, clock and processor, all from one key.
+//!
+//! Messages are late and come twice; links are cut; workers are killed, frozen, cut off, drained,
+//! stopped, slow and wrong; the coordinator is frozen, its clock jumps, its disk is full, its machine crashes and loses, tears
+//! and reorders whatever was not synced; users change their minds. However that goes, every job ends by itself,
+//! every frame is whole and right, nothing acknowledged is rendered again, every lease ends and every queue is bounded.
+//!
+//! A failure names its key and the smallest farm that fails with it; `replay` shows that again.
+//! Mistakes that are planted around the scheduler are all caught (`bugs`). `FLYBY_SIM_KEYS=10000` looks longer.
+#![cfg(test)]
+
+mod bugs;
+mod coordinator;
+mod disk;
+mod farm;
+mod message;
+mod plan;
+mod random;
+mod run;
+mod user;
+mod witness;
+mod worker;
+
+use plan::{Plan, Troubles};
+use run::{all, number_from};
+
+#[test]
+fn in_peace() {
+    let report = all(0..20, |key| Plan::new(key, Troubles::NONE));
+    assert_eq!(report.incidents, 0);
+}
+
+#[test]
+fn everything_at_once() {
+    all(0..100, |key| Plan::new(key, Troubles::ALL));
+}
+
+#[test]
+fn crashes_of_the_coordinator() {
+    let troubles = Troubles {
+        crashes: 60,
+        fulls: 20,
+        ..Troubles::NONE
+    };
+    all(0..40, |key| Plan::new(key, troubles));
+}
+
+#[test]
+fn users_who_change_their_minds() {
+    let troubles = Troubles {
+        wishes: 400,
+        failures: 20,
+        crashes: 40,
+        fulls: 20,
+        ..Troubles::NONE
+    };
+    all(0..number_from("FLYBY_SIM_KEYS").unwrap_or(100), |key| {
+        Plan::new(key, troubles)
+    });
+}
+
+#[test]
+fn wrong_pixels_are_noticed_where_a_tile_is_rendered_twice() {
+    let troubles = Troubles {
+        liars: 500,
+        slow: 300,
+        cuts: 150,
+        freezes: 50,
+        ..Troubles::NONE
+    };
+    let report = all(0..40, |key| Plan::new(key, troubles));
+    assert!(report.incidents > 0);
+}
+
+#[test]
+#[ignore = "1,000 keys and 10 million events, or as many keys as FLYBY_SIM_KEYS says"]
+fn everything_at_once_for_long() {
+    let keys = number_from("FLYBY_SIM_KEYS").unwrap_or(1_000);
+    let report = all(0..keys, |key| {
+        // Larger farms than those above, so that each lives through more.
+        let plan = Plan::new(key, Troubles::ALL);
+        Plan {
+            images: 4 * plan.images + 18,
+            jobs: plan.jobs + 1,
+            ..plan
+        }
+    });
+    assert!(report.events >= keys * 10_000, "{report:?}");
+}

@@ -1,0 +1,178 @@
+//! A bystander who notes what was promised, and says when a promise is broken.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use model::{AttemptId, ImageRef, JobId, Lease, Rect, Span, Timestamp, WorkerId};
+use sched::{ImageState, JobOutcome, JobState, Sched};
+use store::Recalled;
+
+use crate::disk::{HEIGHT, WIDTH};
+
+/// A worker of which nothing was heard for so long holds no lease: four heartbeats, and
+/// room for a coordinator that was frozen and whose clock went back.
+const SILENCE_MAX: Span = Span::from_secs(20);
+
+#[derive(Debug, Default)]
+pub(crate) struct Witness {
+    /// Jobs whose user heard their number.
+    pub(crate) jobs: BTreeSet<JobId>,
+    /// Of those, the cancelled ones.
+    pub(crate) cancelled: BTreeSet<JobId>,
+    /// Images whose encoding is committed.
+    pub(crate) encoded: BTreeSet<ImageRef>,
+    /// Blocks of which two renderings differed.
+    pub(crate) incidents: u64,
+    /// Pixels that were acknowledged and still count.
+    pixels: BTreeMap<ImageRef, Vec<bool>>,
+    /// Every lease of this epoch.
+    leased: BTreeMap<AttemptId, (WorkerId, ImageRef)>,
+    heard: BTreeMap<WorkerId, Timestamp>,
+    /// The scheduler before the last crash, where it had nothing to commit.
+    pub(crate) before: Option<Sched>,
+    placed: BTreeMap<(u64, ImageRef, u32), u32>,
+}
+
+impl Witness {
+    pub(crate) fn hears_of(&mut self, worker: WorkerId, now: Timestamp) {
+        self.heard.insert(worker, now);
+    }
+
+    pub(crate) fn leases(&mut self, worker: WorkerId, lease: &Lease) {
+        let before = self.leased.insert(lease.attempt, (worker, lease.image));
+        assert_eq!(before, None, "an attempt is leased once");
+        if let Some(pixels) = self.pixels.get(&lease.image) {
+            for block in lease.blocks() {
+                let is_new = places(block).any(|place| !pixels[place]);
+                assert!(is_new, "what is acknowledged is never rendered again");
+            }
+        }
+    }
+
+    pub(crate) fn image_of(&self, attempt: AttemptId) -> Option<ImageRef> {
+        self.leased.get(&attempt).map(|&(_, image)| image)
+    }
+
+    pub(crate) fn acknowledges(&mut self, image: ImageRef, rect: Rect) {
+        let none = || vec![false; (WIDTH * HEIGHT) as usize];
+        let pixels = self.pixels.entry(image).or_insert_with(none);
+        for place in places(rect) {
+            pixels[place] = true;
+        }
+    }
+
+    pub(crate) fn forget_pixels(&mut self, image: ImageRef) {
+        self.pixels.remove(&image);
+    }
+
+    pub(crate) fn forget_job(&mut self, job: JobId) {
+        self.jobs.remove(&job);
+        self.cancelled.remove(&job);
+        self.encoded.retain(|image| image.job != job);
+        self.pixels.retain(|image, _| image.job != job);
+    }
+
+    /// A frame is put in its place.
+    pub(crate) fn places(&mut self, epoch: u64, image: ImageRef, era: u32) {
+        let placed = self.placed.entry((epoch, image, era)).or_default();
+        *placed += 1;
+        assert_eq!(*placed, 1, "an image is put in its place once");
+    }
+
+    pub(crate) fn places_not(&mut self, epoch: u64, image: ImageRef, era: u32) {
+        self.placed.remove(&(epoch, image, era));
+    }
+
+    /// No lease outlives its worker.
+    pub(crate) fn check_leases(&self, now: Timestamp, sched: &Sched) {
+        for (&attempt, (worker, _)) in &self.leased {
+            let heard = self.heard.get(worker).copied().unwrap_or_default();
+            let is_over = sched.attempt(attempt).is_none();
+            assert!(
+                is_over || now - heard <= SILENCE_MAX,
+                "every lease ends: {attempt}"
+            );
+        }
+    }
+
+    /// Attempts of another epoch are dead, and what they were leased is of no interest.
+    pub(crate) fn crash(&mut self) {
+        self.leased.clear();
+    }
+
+    /// Holds a scheduler that was told what the store recalls against what was promised.
+    pub(crate) fn compare(&mut self, sched: &Sched, recalled: &Recalled) {
+        if let Some(before) = self.before.take() {
+            are_alike(&before, sched);
+        }
+        for &job in &self.jobs {
+            let state = sched.job(job).map(|job| job.state);
+            assert!(state.is_some(), "{job:?}: a job that was taken is there");
+            let is_cancelled = state == Some(JobState::Over(JobOutcome::Cancelled));
+            assert!(
+                is_cancelled || !self.cancelled.contains(&job),
+                "{job:?} was cancelled"
+            );
+        }
+        for &image in &self.encoded {
+            let state = sched.image(image).map(|view| view.state);
+            let is_encoded = matches!(state, Some(ImageState::Encoded { .. }));
+            assert!(is_encoded, "{image:?} was in its place, and is {state:?}");
+        }
+        let mut there: BTreeMap<ImageRef, Vec<bool>> = BTreeMap::new();
+        for job in &recalled.jobs {
+            for block in &job.blocks {
+                let image = ImageRef {
+                    job: job.job,
+                    image: block.image,
+                };
+                let none = || vec![false; (WIDTH * HEIGHT) as usize];
+                let pixels = there.entry(image).or_insert_with(none);
+                places(block.rect).for_each(|place| pixels[place] = true);
+            }
+        }
+        self.pixels.retain(|&image, promised| {
+            let begins = |state| {
+                matches!(
+                    state,
+                    ImageState::Waiting | ImageState::Rendering | ImageState::Encoding
+                )
+            };
+            let begins = sched.image(image).is_some_and(|view| begins(view.state));
+            let kept = |place: usize| there.get(&image).is_some_and(|pixels| pixels[place]);
+            let lost = (0..promised.len()).any(|place| promised[place] && !kept(place));
+            assert!(
+                !begins || !lost,
+                "{image:?}: what was acknowledged is there"
+            );
+            begins
+        });
+    }
+}
+
+/// Whether a scheduler knows all that the one before it knew durably.
+fn are_alike(before: &Sched, after: &Sched) {
+    assert_eq!(before.jobs().count(), after.jobs().count());
+    for (before_job, after_job) in before.jobs().zip(after.jobs()) {
+        let durable = |job: &sched::JobView<'_>| {
+            let rank = (job.priority, job.share, job.paused, job.focus);
+            (job.job, job.state, rank, job.pixels_done, job.after.clone())
+        };
+        assert_eq!(durable(&before_job), durable(&after_job));
+        let job = before_job.job;
+        for (before, after) in before.images(job).zip(after.images(job)) {
+            let begun = |state| match state {
+                ImageState::Rendering => ImageState::Waiting,
+                state => state,
+            };
+            let alike = begun(before.state) == begun(after.state)
+                && (before.pixels_done == after.pixels_done);
+            // What was in flight of a cancelled job is forgotten.
+            let is_dropped = before_job.state == JobState::Over(JobOutcome::Cancelled);
+            assert!(alike || is_dropped, "{job:?}: {before:?}, then {after:?}");
+        }
+    }
+}
+
+fn places(rect: Rect) -> impl Iterator<Item = usize> {
+    (rect.y0..rect.y1).flat_map(move |y| (rect.x0..rect.x1).map(move |x| (y * WIDTH + x) as usize))
+}
