@@ -49,10 +49,15 @@ impl RecalledJob {
             after: after.filter(|after| kept.contains(after)).collect(),
             ..self.submission.clone()
         });
-        // Before the images, since a job that is over takes no such command.
-        let pause = self.paused.then_some(Command::Pause);
+        // Before the images, since a job that is over takes no such command. The submission stays as
+        // it was, so that submitting it again is still submitting it once.
+        let (submitted, pause) = (&self.submission, self.paused);
+        let priority =
+            (self.priority != submitted.priority).then_some(Command::Priority(self.priority));
+        let share = (self.share != submitted.share).then_some(Command::Share(self.share));
+        let pause = pause.then_some(Command::Pause);
         let focus = self.focus.map(|focus| Command::Focus(Some(focus)));
-        let commands = pause.into_iter().chain(focus);
+        let commands = [priority, share, pause, focus].into_iter().flatten();
         let told = move |command| (self.unix_ms, Event::Command { job, command });
         let cancel = self.cancelled_unix_ms.map(|unix_ms| {
             let command = Command::Cancel;

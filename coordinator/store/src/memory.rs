@@ -24,6 +24,8 @@ struct Job {
     unix_ms: u64,
     submission: Submission,
     about: String,
+    priority: i32,
+    share: u32,
     paused: bool,
     focus: Option<Rect>,
     cancelled_unix_ms: Option<u64>,
@@ -199,6 +201,8 @@ impl Job {
     fn new(unix_ms: u64, submission: Submission, about: String) -> Self {
         Self {
             unix_ms,
+            priority: submission.priority,
+            share: submission.share,
             submission,
             about,
             paused: false,
@@ -230,8 +234,8 @@ impl Job {
                 self.images.remove(&image);
                 self.blocks.remove(&image);
             }
-            Command::Priority(priority) => self.submission.priority = priority,
-            Command::Share(share) => self.submission.share = share,
+            Command::Priority(priority) => self.priority = priority,
+            Command::Share(share) => self.share = share,
             Command::Focus(focus) => self.focus = focus,
             // The whole job is gone already.
             Command::Remove => {}
@@ -252,6 +256,8 @@ impl Job {
             unix_ms: self.unix_ms,
             submission: self.submission.clone(),
             about: self.about.clone(),
+            priority: self.priority,
+            share: self.share,
             paused: self.paused,
             focus: self.focus,
             cancelled_unix_ms: self.cancelled_unix_ms,

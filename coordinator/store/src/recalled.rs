@@ -19,10 +19,14 @@ pub struct RecalledJob {
     pub job: JobId,
     /// When it was submitted.
     pub unix_ms: u64,
-    /// As it was submitted, but with the priority and share of now.
+    /// As it was submitted.
     pub submission: Submission,
     /// What its keeper said of it.
     pub about: String,
+    /// Its priority of now.
+    pub priority: i32,
+    /// Its share of now.
+    pub share: u32,
     /// Whether it is paused.
     pub paused: bool,
     /// Its region of interest.

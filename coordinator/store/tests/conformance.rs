@@ -277,7 +277,8 @@ fn commands_change_the_job(mut store: impl Crash) {
     let mut store = store.crash();
     let job = only(&mut store);
     assert!(job.paused);
-    assert_eq!((job.submission.priority, job.submission.share), (-7, 9));
+    assert_eq!((job.priority, job.share), (-7, 9));
+    assert_eq!(job.submission, submission(1));
     assert_eq!(job.focus, Some(rect(2)));
     store
         .commit(&[wants(1, Command::Resume), wants(1, Command::Focus(None))])

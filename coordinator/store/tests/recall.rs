@@ -131,3 +131,19 @@ fn an_image_with_all_its_blocks_is_encoded_at_once() {
     assert!(!effects.contains(&encode));
     assert_eq!(state(&sched, 3), ImageState::Waiting);
 }
+
+#[test]
+fn submitting_again_after_a_crash_is_submitting_once() {
+    let entries = [
+        submitted(1),
+        wants(1, Command::Priority(4)),
+        wants(1, Command::Share(9)),
+    ];
+    let (mut sched, _) = told(&recalled(&entries));
+    let mut effects = Vec::new();
+    sched.handle(Timestamp(2), Event::Submit(submission(1)), &mut effects);
+    let is_known = |effect: &Effect| matches!(effect, Effect::Submitted { job: JobId(1), .. });
+    assert!(effects.iter().any(is_known), "{effects:?}");
+    let job = sched.job(JobId(1)).expect("it is known");
+    assert_eq!((job.priority, job.share), (4, 9));
+}

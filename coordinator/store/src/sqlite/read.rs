@@ -96,7 +96,8 @@ fn jobs(connection: &Connection) -> rusqlite::Result<Jobs> {
     let sql = "SELECT job, unix_ms, about, paused, focus_x0, focus_y0, focus_x1, focus_y1,
             cancelled_unix_ms, log_lines,
             submission, name, scene, revision, frames_start, frames_end, frames_step,
-            x0, y0, x1, y1, tiles, tiles_a, tiles_b, priority, share, threads, memory_bytes
+            x0, y0, x1, y1, tiles, tiles_a, tiles_b, priority, share, threads, memory_bytes,
+            priority_now, share_now
          FROM jobs";
     rows(connection, sql, |row| {
         let job = JobId(uint(row, 0)?);
@@ -107,6 +108,8 @@ fn jobs(connection: &Connection) -> rusqlite::Result<Jobs> {
             unix_ms: uint(row, 1)?,
             submission: submission_of(row, 10)?,
             about: row.get(2)?,
+            priority: row.get(28)?,
+            share: row.get(29)?,
             paused: row.get(3)?,
             focus: focus.map(|_| rect(row, 4)).transpose()?,
             cancelled_unix_ms: cancelled.map(i64::cast_unsigned),

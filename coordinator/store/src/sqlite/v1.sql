@@ -26,8 +26,10 @@ CREATE TABLE jobs (
     tiles TEXT NOT NULL CHECK (tiles IN ('rule', 'size', 'time')),
     tiles_a INTEGER,               -- rule: fewest pixels; size: columns; time: us; NULL is the farm's own
     tiles_b INTEGER,               -- size: rows
-    priority INTEGER NOT NULL,     -- of now
-    share INTEGER NOT NULL,        -- of now
+    priority INTEGER NOT NULL,     -- as it was submitted
+    share INTEGER NOT NULL,
+    priority_now INTEGER NOT NULL,
+    share_now INTEGER NOT NULL,
     threads INTEGER NOT NULL,      -- what it asks of workers
     memory_bytes INTEGER NOT NULL,
     about TEXT NOT NULL,           -- the coordinator's, JSON

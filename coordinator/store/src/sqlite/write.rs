@@ -124,9 +124,9 @@ impl Writer<'_> {
         let (shape, a, b) = tiles(submission.tiles);
         let sql = "INSERT INTO jobs (job, unix_ms, submission, name, scene, revision,
                 frames_start, frames_end, frames_step, x0, y0, x1, y1, tiles, tiles_a, tiles_b,
-                priority, share, threads, memory_bytes, about)
+                priority, share, priority_now, share_now, threads, memory_bytes, about)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12, ?13, ?14, ?15, ?16,
-                ?17, ?18, ?19, ?20, ?21)
+                ?17, ?18, ?17, ?18, ?19, ?20, ?21)
              ON CONFLICT DO NOTHING";
         let new = self.connection.prepare_cached(sql)?.execute(params![
             job,
@@ -234,11 +234,11 @@ impl Writer<'_> {
                 self.drop_blocks(ImageRef { job, image })
             }
             Command::Priority(priority) => self.run(
-                "UPDATE jobs SET priority = ?2 WHERE job = ?1",
+                "UPDATE jobs SET priority_now = ?2 WHERE job = ?1",
                 params![id, priority],
             ),
             Command::Share(share) => self.run(
-                "UPDATE jobs SET share = ?2 WHERE job = ?1",
+                "UPDATE jobs SET share_now = ?2 WHERE job = ?1",
                 params![id, share],
             ),
             Command::Focus(focus) => self.run(
