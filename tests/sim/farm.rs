@@ -72,8 +72,8 @@ pub(crate) struct Farm {
 /// After so long nothing goes wrong any more…
 const TROUBLED: Span = Span::from_secs(1_200);
 
-/// …and after so long everything must be done.
-const END: Span = Span::from_secs(4 * 3_600);
+/// …and after so long everything must be done, even by one slow thread.
+const END: Span = Span::from_secs(24 * 3_600);
 
 impl Farm {
     pub(crate) fn new(plan: Plan) -> Self {
