@@ -22,6 +22,10 @@ const UNMAPPED_FACTOR: u64 = 4;
 /// but those that failed at it, which are fewer than this before its image fails.
 const SEATS_LOOKED_AT: usize = 8;
 
+/// Most workers that are helped out with somebody else's work at one event. What is called back may go to
+/// another worker than the one it was called back for, and be worth calling back again.
+const HELPS_MAX: usize = 64;
+
 /// Why a tile is leased.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Purpose {
@@ -34,7 +38,7 @@ pub(crate) enum Purpose {
 impl Sched {
     /// Leases tiles while a worker wants one that it may have, and helps where jobs are about to end.
     pub(crate) fn lease_all(&mut self, out: &mut Vec<Effect>) {
-        loop {
+        for helped in 0.. {
             while let Some(kind) = self.market.touched() {
                 let goes_on = match self.match_kind(kind) {
                     // Where all that waited turns out to be durable, others of its kind are next.
@@ -47,7 +51,7 @@ impl Sched {
                     self.market.settled(kind);
                 }
             }
-            if !self.help_to_end(out) {
+            if helped == HELPS_MAX || !self.help_to_end(out) {
                 return;
             }
         }
