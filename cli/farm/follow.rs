@@ -165,9 +165,9 @@ impl Follower<'_> {
             let job = self.job;
             return Error::new(
                 Ending::JobLost,
-                format!("job {job} is forgotten: its coordinator was started anew"),
+                format!("job {job} is not there any more: it was removed, or its coordinator has another state folder now"),
             )
-            .next("frames that it finished are in its state folder; submit the job again");
+            .next("frames that it finished are in the state folder; `flyby job list` shows the jobs there are");
         }
         error
     }

@@ -1,8 +1,8 @@
 //! A full disk: the sentence says so, nothing half-written is taken for a frame, and with
 //! space again the work goes on.
 
-use crate::harness::scenes::{FLYBY, TINY, film_digests, rendered};
-use crate::harness::{Farm, Job, Place, need, wait};
+use crate::harness::scenes::{FLYBY, film_digests, rendered};
+use crate::harness::{Farm, Place, need, wait};
 
 /// Mounts a tmpfs of `$1` on `$2`, then becomes the rest of its words.
 const ON_SMALL_DISK: &str =
@@ -57,35 +57,40 @@ fn render_says_so_and_goes_on_when_there_is_space() {
     assert_eq!(film_digests(&place, "kept"), reference);
 }
 
+/// The same, with more space as soon as the file `$3` is there.
+const ON_GROWING_DISK: &str = "mount -t tmpfs -o size=\"$1\" flyby-test \"$2\" || exit
+     (until [ -e \"$3\" ]; do sleep 0.1; done; mount -o remount,size=64m \"$2\") &
+     shift 3; exec \"$@\"";
+
 #[test]
-fn a_coordinator_fails_that_image_with_the_reason_and_takes_the_next_job() {
+fn a_coordinator_waits_says_so_and_goes_on_when_there_is_space() {
     let Some(mounting) = need::mounting() else {
         return;
     };
     let place = Place::new();
-    let jobs = place.state().join("jobs");
+    let (jobs, room) = (place.state().join("jobs"), place.path("room"));
     std::fs::create_dir_all(&jobs).unwrap();
     let disk = [
         "sh",
         "-c",
-        ON_SMALL_DISK,
+        ON_GROWING_DISK,
         "sh",
         "600k",
         jobs.to_str().unwrap(),
+        room.to_str().unwrap(),
     ];
     let mut farm = Farm::wrapped(place, &[mounting, &disk].concat(), &[]);
     farm.worker(&["--threads", "1"]);
 
     let job = farm.submit(&[&[FLYBY], &IMAGE[..]].concat());
-    let failed = farm.wait_until(job, "the job is over", Job::is_over);
-    assert_eq!(failed.state(), "failed", "{failed:?}");
-    let reason = failed.images()[0]["error"].as_str().unwrap();
-    assert!(reason.contains("no space left"), "{reason}");
-
-    // Whoever waits for it is told too.
-    let watch = farm.flyby(["job", "watch", &job.to_string()]);
-    watch.refused(5, &["frame 0 failed", "no space left"]);
-
-    let next = farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat());
-    farm.wait_done(next);
+    wait::until("somebody is told what the job waits for", || {
+        let why = farm.flyby(["job", "why", &job.to_string()]).ok();
+        why.contains("no space left").then_some(())
+    });
+    assert_eq!(farm.job(job).state(), "running");
+    std::fs::write(&room, "").unwrap();
+    let done = farm.wait_done(job);
+    assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+    let reference = rendered(&farm.place, "reference", &IMAGE);
+    assert_eq!(done.film_digests(), reference);
 }

@@ -22,6 +22,7 @@ mod full_disk;
 mod hostile_messages;
 mod readers;
 mod readme;
+mod restart;
 mod resume;
 mod same_pixels;
 mod stopping;

@@ -37,19 +37,23 @@ impl Farm {
         let arguments = command.iter().chain(options);
         let command = place.wrapped(wrapper, arguments);
         let mut coordinator = place.start_command("coordinator", command);
-        let file = place.state().join("coordinator.json");
-        let address = wait::until("the coordinator says where it listens", || {
-            let ended = coordinator.ended();
-            assert!(ended.is_none(), "the coordinator ended with {ended:?}");
-            let said: Value = serde_json::from_slice(&std::fs::read(&file).ok()?).unwrap();
-            Some(said["address"].as_str().unwrap().parse().unwrap())
-        });
+        let address = says_where(&place, &mut coordinator);
         Self {
             workers: Vec::new(),
             coordinator,
             address,
             place,
         }
+    }
+
+    /// Starts the coordinator again that was killed or has ended, where it was, over the same state.
+    pub(crate) fn start_again(&mut self) {
+        // One that was killed could not take it back.
+        let _ = std::fs::remove_file(self.place.state().join("coordinator.json"));
+        let address = self.address.to_string();
+        let command = ["coordinator", "--while-input-open", "--listen", &address];
+        self.coordinator = self.place.start("coordinator", command);
+        assert_eq!(says_where(&self.place, &mut self.coordinator), self.address);
     }
 
     /// A farm of `count` workers of one thread each.
@@ -144,6 +148,21 @@ impl Farm {
             (connected.count() == count).then_some(())
         });
     }
+}
+
+/// Where a coordinator that was just started says that it listens.
+fn says_where(place: &Place, coordinator: &mut Process) -> SocketAddr {
+    let file = place.state().join("coordinator.json");
+    wait::until("the coordinator says where it listens", || {
+        let ended = coordinator.ended();
+        assert!(
+            ended.is_none(),
+            "the coordinator ended with {ended:?}: {}",
+            coordinator.stderr()
+        );
+        let said: Value = serde_json::from_slice(&std::fs::read(&file).ok()?).unwrap();
+        Some(said["address"].as_str().unwrap().parse().unwrap())
+    })
 }
 
 /// An address of loopback on which nobody listens.

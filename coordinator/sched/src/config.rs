@@ -10,8 +10,9 @@ use model::{Epoch, Revision, Span};
 pub struct Config {
     /// The coordinator's epoch; every attempt of this scheduler carries it.
     pub epoch: Epoch,
-    /// Where given, jobs and workers of any other renderer revision are refused.
-    /// Where not, all are taken and leases go to workers of the job's revision.
+    /// Where given, workers of any other renderer revision are refused, but for those that a job which
+    /// is not over is pinned to: one that was submitted before an upgrade goes on with the workers of then.
+    /// Leases go to workers of the job's revision in any case.
     pub revision: Option<Revision>,
     /// A worker of which nothing is heard for so long is lost, and its attempts with it.
     pub liveness_limit: Span,

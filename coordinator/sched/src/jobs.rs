@@ -73,10 +73,6 @@ impl Sched {
 
     fn check(&self, spec: &Submission) -> Result<(), SubmitRefusal> {
         let limits = &self.config.limits;
-        if let Some(ours) = self.config.revision.filter(|&ours| ours != spec.revision) {
-            let asked = spec.revision;
-            return Err(SubmitRefusal::WrongRevision { asked, ours });
-        }
         if spec.name.len() > limits.name_bytes_max {
             let bytes_max = limits.name_bytes_max;
             return Err(SubmitRefusal::NameTooLong { bytes_max });

@@ -59,7 +59,13 @@ impl Sched {
     fn admit_worker(&self, id: WorkerId, offer: &Offer) -> Result<(), WorkerRefusal> {
         let known = self.workers.by_id(id);
         let theirs = offer.revision;
+        // A look at all jobs, where a worker is not like the others.
+        let is_asked_for = || {
+            let mut jobs = self.jobs.values();
+            jobs.any(|job| !job.is_over() && job.spec.revision == theirs)
+        };
         let wanted = self.config.revision;
+        let wanted = wanted.filter(|&ours| ours == theirs || !is_asked_for());
         let wanted = wanted.or(known.map(|known| known.offer.revision));
         if let Some(wanted) = wanted.filter(|&wanted| wanted != theirs) {
             return Err(WorkerRefusal::WrongRevision { theirs, wanted });

@@ -181,13 +181,6 @@ pub enum SubmitRefusal {
         /// Most bytes there may be.
         bytes_max: usize,
     },
-    /// The job wants a revision of the renderer that this farm does not have.
-    WrongRevision {
-        /// The job's.
-        asked: Revision,
-        /// The farm's.
-        ours: Revision,
-    },
 }
 
 impl SubmitRefusal {
@@ -254,11 +247,6 @@ impl fmt::Display for SubmitRefusal {
             Self::NameTooLong { bytes_max } => {
                 write!(f, "the job's name is longer than {bytes_max} bytes")
             }
-            Self::WrongRevision { asked, ours } => write!(
-                f,
-                "the job is for renderer revision {asked}, this farm renders with revision {ours}: \
-                 submit with the coordinator's version"
-            ),
         }
     }
 }

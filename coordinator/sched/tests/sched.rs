@@ -178,17 +178,6 @@ fn what_cannot_be_done_is_refused_with_its_reason() {
         refusal(usual(), |asked| asked.name = "x".repeat(201)),
         SubmitRefusal::NameTooLong { bytes_max: 200 }
     );
-    let pinned = Config {
-        revision: Some(Revision(2)),
-        ..usual()
-    };
-    assert_eq!(
-        refusal(pinned, |_| ()),
-        SubmitRefusal::WrongRevision {
-            asked: REVISION,
-            ours: Revision(2)
-        }
-    );
     let full = Config {
         limits: Limits {
             jobs_max: 0,
@@ -248,18 +237,20 @@ fn leases_go_to_workers_of_the_pinned_revision() {
     farm.worker(2, 1)
         .wants(&[welcome(2, &[]), lease(2, 1, 0, 0)]);
 
-    Farm::new(Config {
+    let mut upgraded = Farm::new(Config {
         revision: Some(Revision(2)),
         ..Config::new(EPOCH)
-    })
-    .joins(1, &[])
-    .wants(&[Effect::WorkerRefused {
+    });
+    upgraded.joins(1, &[]).wants(&[Effect::WorkerRefused {
         worker: worker(1),
         refusal: WorkerRefusal::WrongRevision {
             theirs: REVISION,
             wanted: Revision(2),
         },
     }]);
+    // A job of before the upgrade is finished by workers of then.
+    upgraded.job(1).joins(1, &[]);
+    assert_eq!(upgraded.never_mind().last(), Some(&welcome(1, &[])));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Submissions as they arrive: checked against limits and digests, on disk until their job is over.
+//! Submissions as they arrive: checked against limits and digests, on disk.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +14,7 @@ use wire::convert;
 use wire::link::ASSET_BYTES_MAX;
 use wire::proto::{self, ErrorKind, submit_part::Part};
 
+use crate::scene_files::SceneFiles;
 use crate::state::{make_folder, remove_all};
 
 /// Most bytes of the settings that a user gives.
@@ -27,13 +28,10 @@ pub(crate) struct Inbox {
     asset_bytes_max: u64,
 }
 
-/// The folder of one submission: the scene's bytes, and each asset's under its
-/// digest. Dropping it removes it.
+/// The folder of one submission as it arrives. Dropping it removes it.
 #[derive(Debug)]
 pub(crate) struct Upload {
-    root: PathBuf,
-    description: Digest,
-    assets: Vec<Digest>,
+    files: SceneFiles,
 }
 
 /// A submission that has arrived whole.
@@ -47,21 +45,32 @@ pub(crate) struct NewJob {
 }
 
 impl Upload {
-    /// Where a scene description's bytes are, if they are these.
-    pub(crate) fn scene(&self, digest: Digest) -> Option<PathBuf> {
-        (digest == self.description).then(|| self.root.join("scene"))
+    /// The files, where they are to stay.
+    pub(crate) fn files_at(&self, root: PathBuf) -> SceneFiles {
+        SceneFiles {
+            root,
+            ..self.files.clone()
+        }
     }
 
-    /// Where an asset's bytes are, if it is one of these.
-    pub(crate) fn asset(&self, digest: Digest) -> Option<PathBuf> {
-        let known = self.assets.contains(&digest);
-        known.then(|| self.root.join(digest.to_string()))
+    /// Moves everything to where it is to stay, and makes that durable. May be tried again.
+    pub(crate) fn move_to(&self, root: &Path) -> std::io::Result<()> {
+        let from = &self.files.root;
+        if from.is_dir() {
+            for entry in std::fs::read_dir(from)? {
+                std::fs::File::open(entry?.path())?.sync_all()?;
+            }
+            std::fs::File::open(from)?.sync_all()?;
+            std::fs::rename(from, root)?;
+        }
+        let parent = root.parent().unwrap_or(root);
+        std::fs::File::open(parent)?.sync_all()
     }
 }
 
 impl Drop for Upload {
     fn drop(&mut self) {
-        if let Err(error) = remove_all(&self.root) {
+        if let Err(error) = remove_all(&self.files.root) {
             tracing::warn!("{}", crate::storage::chain(&error));
         }
     }
@@ -99,7 +108,7 @@ impl Inbox {
         }
         let mut upload = self.open(digest)?;
         let (bytes, mut ahead) = receive_description(head.description_bytes, parts).await?;
-        write(&upload.root.join("scene"), &bytes).await?;
+        write(&upload.files.scene_path(), &bytes).await?;
         let description = read_description(bytes, digest).await?;
         self.receive_assets(&description, &mut upload, &mut ahead, parts)
             .await?;
@@ -144,9 +153,11 @@ impl Inbox {
         let root = self.root.join(number.to_string());
         make_folder(&root).map_err(storage)?;
         Ok(Upload {
-            root,
-            description,
-            assets: Vec::new(),
+            files: SceneFiles {
+                root,
+                description,
+                assets: Vec::new(),
+            },
         })
     }
 
@@ -175,12 +186,12 @@ impl Inbox {
                     asset.name, asset.bytes
                 )));
             }
-            if upload.assets.contains(&asset.digest) {
+            if upload.files.assets.contains(&asset.digest) {
                 continue;
             }
-            let path = upload.root.join(asset.digest.to_string());
+            let path = upload.files.asset_path(asset.digest);
             receive_asset(asset, &path, ahead, parts).await?;
-            upload.assets.push(asset.digest);
+            upload.files.assets.push(asset.digest);
         }
         match ahead.take() {
             Some(part) => Some(part),

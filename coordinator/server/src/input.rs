@@ -6,13 +6,15 @@ use std::sync::Arc;
 use bytes::Bytes;
 use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
 use sched::{BlockRef, Command, Event, LinkId};
+use store::Entry;
 use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc, oneshot};
 use tonic::Status;
 use wire::Failure;
 use wire::proto;
 
+use crate::about::counters_bytes;
 use crate::inbox::NewJob;
-use crate::storage::{Encoded, Stored};
+use crate::storage::{Encoded, Stored, Ticket};
 
 /// Where an answer goes; whoever asked may have left.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T, Failure>>;
@@ -57,10 +59,16 @@ pub(crate) enum Input {
         /// Which stream.
         link: LinkId,
     },
-    /// Blocks are durable, or could not be made so.
+    /// Blocks are durable, or no film's.
     Stored(Vec<Stored>),
+    /// Every record up to this one is durable.
+    Committed(Ticket),
     /// An image is encoded, or could not be.
     Encoded(Encoded),
+    /// The disk waits to be tried again, or is well again.
+    Trouble(Option<String>),
+    /// The store can be used no more.
+    Broken(String),
     /// End: tell everybody, and leave the loop.
     Stop,
 }
@@ -161,5 +169,16 @@ pub(crate) struct Arrived {
 impl Arrived {
     pub(crate) fn image(&self) -> ImageRef {
         self.block.image
+    }
+
+    /// What the store is told when it is synced.
+    pub(crate) fn entry(&self) -> Entry {
+        Entry::Block {
+            image: self.block.image,
+            rect: self.block.rect,
+            elapsed: self.elapsed,
+            pixels: self.pixels,
+            about: counters_bytes(&self.counters),
+        }
     }
 }

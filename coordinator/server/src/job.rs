@@ -4,11 +4,11 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use image::Formats;
-use model::{ImageNumber, ImageRef, JobId, SubmissionId};
+use model::{ImageNumber, ImageRef, JobId, Span};
 use tokio::sync::broadcast;
 use wire::proto;
 
-use crate::inbox::Upload;
+use crate::scene_files::SceneFiles;
 use crate::state::JobFolders;
 use crate::storage::Plan;
 
@@ -30,6 +30,14 @@ const LINE_BYTES_MAX: usize = 1_000;
 /// Sums by name.
 pub(crate) type Counters = BTreeMap<String, u64>;
 
+/// What was done of an image.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Work {
+    pub(crate) blocks: u32,
+    pub(crate) render_time: Span,
+    pub(crate) counters: Counters,
+}
+
 /// Whether something is counted, or taken back.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(crate) enum Sign {
@@ -40,18 +48,16 @@ pub(crate) enum Sign {
 /// One job.
 #[derive(Debug)]
 pub(crate) struct Job {
-    /// The submission it came from.
-    pub(crate) submission: SubmissionId,
     /// How its images are stored.
     pub(crate) plan: Arc<Plan>,
-    /// Its scene and assets on disk, until it is over.
-    pub(crate) upload: Option<Upload>,
+    /// Its scene and assets on disk.
+    pub(crate) scene: SceneFiles,
     /// Its files, by image.
     pub(crate) files: BTreeMap<ImageNumber, Vec<proto::FrameFile>>,
     /// Sums over all its blocks.
     pub(crate) counters: Counters,
-    /// Sums over the blocks of each image that is being rendered.
-    image_counters: BTreeMap<ImageNumber, Counters>,
+    /// What was done of each image that is being rendered.
+    work: BTreeMap<ImageNumber, Work>,
     log: Log,
     watchers: Option<broadcast::Sender<Arc<proto::JobUpdate>>>,
     changed: BTreeSet<ImageNumber>,
@@ -63,19 +69,13 @@ pub(crate) struct Job {
 }
 
 impl Job {
-    pub(crate) fn new(
-        plan: Arc<Plan>,
-        upload: Upload,
-        submission: SubmissionId,
-        lines: usize,
-    ) -> Self {
+    pub(crate) fn new(plan: Arc<Plan>, scene: SceneFiles, lines: usize) -> Self {
         Self {
-            submission,
             plan,
-            upload: Some(upload),
+            scene,
             files: BTreeMap::new(),
             counters: Counters::new(),
-            image_counters: BTreeMap::new(),
+            work: BTreeMap::new(),
             log: Log::new(lines),
             watchers: Some(broadcast::Sender::new(WATCHER_BEHIND_MAX)),
             changed: BTreeSet::new(),
@@ -83,6 +83,22 @@ impl Job {
             new_lines: Vec::new(),
             told: (0, 0),
         }
+    }
+
+    /// Goes on with the log of an earlier start.
+    pub(crate) fn recall_log(&mut self, lines: &[(u64, String)], dropped: u64) {
+        for (unix_ms, text) in lines {
+            self.log.push(proto::LogLine {
+                unix_ms: *unix_ms,
+                text: text.clone(),
+            });
+        }
+        self.log.dropped += dropped;
+    }
+
+    /// Goes on with the sums of an image that was finished before this start.
+    pub(crate) fn recall_image(&mut self, counters: &Counters) {
+        add(&mut self.counters, counters, Sign::Plus);
     }
 
     pub(crate) fn folders(&self) -> &JobFolders {
@@ -93,25 +109,38 @@ impl Job {
         self.plan.formats
     }
 
-    /// Adds what was counted while a block was rendered that is now durable, or takes it back.
-    pub(crate) fn count(&mut self, image: ImageNumber, counters: &[(String, u64)], sign: Sign) {
-        let of_image = match sign {
-            Sign::Plus => Some(self.image_counters.entry(image).or_default()),
-            Sign::Minus => self.image_counters.get_mut(&image),
+    /// Adds what a block that is now durable took, or takes it back.
+    pub(crate) fn count(
+        &mut self,
+        image: ImageNumber,
+        elapsed: Span,
+        counters: &[(String, u64)],
+        sign: Sign,
+    ) {
+        let work = match sign {
+            Sign::Plus => Some(self.work.entry(image).or_default()),
+            Sign::Minus => self.work.get_mut(&image),
         };
-        for sums in of_image.into_iter().chain([&mut self.counters]) {
-            let full = sums.len() + counters.len() > COUNTERS_MAX;
-            for (name, value) in counters {
-                match (sums.get_mut(name), sign) {
-                    (Some(sum), Sign::Plus) => *sum = sum.saturating_add(*value),
-                    (Some(sum), Sign::Minus) => *sum = sum.saturating_sub(*value),
-                    (None, Sign::Plus) if !full => {
-                        sums.insert(name.clone(), *value);
-                    }
-                    (None, _) => {}
+        if let Some(work) = work {
+            let (blocks, time) = (&mut work.blocks, &mut work.render_time.0);
+            match sign {
+                Sign::Plus => {
+                    *blocks = blocks.saturating_add(1);
+                    *time = time.saturating_add(elapsed.0);
+                }
+                Sign::Minus => {
+                    *blocks = blocks.saturating_sub(1);
+                    *time = time.saturating_sub(elapsed.0);
                 }
             }
+            add(&mut work.counters, pairs(counters), sign);
         }
+        add(&mut self.counters, pairs(counters), sign);
+    }
+
+    /// What was done so far of an image that is being rendered.
+    pub(crate) fn work(&self, image: ImageNumber) -> Work {
+        self.work.get(&image).cloned().unwrap_or_default()
     }
 
     /// Notes that a tile of an image is leased; whether it is the first.
@@ -119,19 +148,21 @@ impl Job {
         self.begun.insert(image)
     }
 
-    /// The sums of an image that is complete or dropped; they are kept no longer.
-    pub(crate) fn take_counters(&mut self, image: ImageNumber) -> Counters {
-        self.image_counters.remove(&image).unwrap_or_default()
+    /// The same of one that is in its place or dropped; it is kept no longer.
+    pub(crate) fn take_work(&mut self, image: ImageNumber) -> Work {
+        self.work.remove(&image).unwrap_or_default()
     }
 
-    /// Adds a line to its log.
-    pub(crate) fn say(&mut self, unix_ms: u64, text: &str) {
+    /// Adds a line to its log; gives it as it stands there.
+    pub(crate) fn say(&mut self, unix_ms: u64, text: &str) -> String {
         let text = wire::convert::sentence(text, LINE_BYTES_MAX);
+        let said = text.clone();
         let line = proto::LogLine { unix_ms, text };
         if self.has_watchers() && self.new_lines.len() < LINES_PER_MESSAGE {
             self.new_lines.push(line.clone());
         }
         self.log.push(line);
+        said
     }
 
     /// Its log as it stands.
@@ -200,6 +231,29 @@ impl Job {
     /// Ends all watching: nothing will change any more.
     pub(crate) fn dismiss_watchers(&mut self) {
         self.watchers = None;
+    }
+}
+
+fn pairs(counters: &[(String, u64)]) -> impl Iterator<Item = (&String, &u64)> {
+    counters.iter().map(|(name, value)| (name, value))
+}
+
+/// Adds counters to sums, or takes them back.
+fn add<'a>(
+    sums: &mut Counters,
+    counters: impl IntoIterator<Item = (&'a String, &'a u64)>,
+    sign: Sign,
+) {
+    for (name, &value) in counters {
+        let full = sums.len() >= COUNTERS_MAX;
+        match (sums.get_mut(name), sign) {
+            (Some(sum), Sign::Plus) => *sum = sum.saturating_add(value),
+            (Some(sum), Sign::Minus) => *sum = sum.saturating_sub(value),
+            (None, Sign::Plus) if !full => {
+                sums.insert(name.clone(), value);
+            }
+            (None, _) => {}
+        }
     }
 }
 

@@ -13,12 +13,14 @@
 //!
 //! It names no worker's code: they meet in `wire`. `agent`'s `tests/farm.rs` shows the whole.
 
+mod about;
 mod clock;
 mod config;
 mod grpc;
 mod inbox;
 mod input;
 mod job;
+mod scene_files;
 mod shell;
 mod start;
 mod state;

@@ -5,7 +5,9 @@ use std::net::SocketAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
-use model::Epoch;
+use image::ImageError;
+use model::{Epoch, JobId};
+use store::{Sqlite, StoreError};
 use tokio::net::TcpListener;
 use tokio::sync::{mpsc, oneshot};
 use tokio::task::JoinHandle;
@@ -15,7 +17,7 @@ use crate::clock::Clock;
 use crate::config::Config;
 use crate::grpc::{self, Door};
 use crate::input::Input;
-use crate::shell::Shell;
+use crate::shell::{Kept, Shell};
 use crate::state::{State, StateError};
 use crate::storage::Storage;
 
@@ -34,6 +36,22 @@ pub enum StartError {
     /// The state folder cannot be used.
     #[error(transparent)]
     State(#[from] StateError),
+    /// The store cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// What the store says of a job cannot be understood.
+    #[error(
+        "the store says of job {job} what cannot be understood ({what}); start the version that took it, or move the store away to begin without it"
+    )]
+    Job {
+        /// The job.
+        job: JobId,
+        /// What is wrong.
+        what: String,
+    },
+    /// A scratch file cannot be read.
+    #[error("an image that is being rendered cannot be gone on with")]
+    Scratch(#[source] ImageError),
     /// Another program listens there.
     #[error("port {} is in use at {}: stop the other program, or choose another port", .0.port(), .0.ip())]
     PortInUse(SocketAddr),
@@ -73,6 +91,8 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     }
     let config = Arc::new(config);
     let state = Arc::new(State::take(&config.state)?);
+    let mut store = Sqlite::open(&state.store())?;
+    let (kept, open) = Kept::read(&state, &mut store)?;
     let listener = listen(config.listen).await?;
     let address = listener.local_addr().map_err(|source| StartError::Listen {
         address: config.listen,
@@ -81,8 +101,10 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     state.announce(address)?;
 
     let (inputs, taken) = mpsc::channel(config.limits.inputs_max);
-    let storage = Storage::start(inputs.clone()).map_err(StartError::Thread)?;
-    let shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
+    let storage = Storage::start(inputs.clone(), store, open).map_err(StartError::Thread)?;
+    let jobs = kept.len();
+    let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
+    shell.recall(kept);
     let shell = tokio::spawn(shell.run(taken));
     let door = Arc::new(Door::new(inputs.clone(), config, &state));
     let (stop, stopped) = oneshot::channel();
@@ -93,8 +115,8 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     tracing::info!(
         %address,
         epoch = state.epoch().0,
-        "the coordinator listens; jobs live in its memory: what is not finished when it stops is \
-         forgotten, finished frames stay"
+        jobs,
+        "the coordinator listens"
     );
     Ok(Running {
         address,
@@ -132,8 +154,7 @@ impl Running {
         &self.token
     }
 
-    /// Stops it: workers and watchers are told, scratch files are removed, finished
-    /// frames stay. Answers when everything has ended.
+    /// Stops it: workers and watchers are told; jobs go on at the next start. Answers when everything has ended.
     pub async fn shutdown(self) {
         // An error says that the loop has ended already.
         let _ = self.inputs.send(Input::Stop).await;

@@ -5,19 +5,25 @@
 //! token              64 hexadecimal digits, mode 0600
 //! epoch              how often a coordinator was started here
 //! coordinator.json   where the running one listens
-//! inbox/<n>/         submissions: scene and assets; of this start only
-//! jobs/<epoch>-<job>/frames/    finished frames; they stay
-//! jobs/<epoch>-<job>/scratch/   images being rendered; of this start only
+//! farm.sqlite        jobs, finished images, blocks of the others: what the `store` keeps
+//! jobs/arriving/     submissions, on the disk that they are to stay on; of this start only
+//! jobs/<job>/scene/    the scene and its assets
+//! jobs/<job>/frames/   finished frames; they stay when the job is forgotten
+//! jobs/<job>/scratch/  images being rendered
 //! ```
 
+use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Write as _};
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
-use model::{Epoch, JobId};
+use model::{Epoch, ImageNumber, ImageRef, JobId};
 use wire::auth::Token;
 use wire::place::{COORDINATOR_FILE, Coordinator, TOKEN_FILE};
+
+/// The folder among those of jobs where submissions arrive.
+const ARRIVING: &str = "arriving";
 
 /// Why a state folder cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -73,14 +79,16 @@ pub(crate) struct State {
 pub(crate) struct JobFolders {
     /// What is left at the end.
     pub(crate) frames: PathBuf,
-    /// What is not.
+    /// Images being rendered.
     pub(crate) scratch: PathBuf,
+    /// What workers fetch.
+    pub(crate) scene: PathBuf,
     root: PathBuf,
 }
 
 impl State {
     /// Takes the folder: locks it, counts the start, makes the token if there
-    /// is none, removes what an earlier start left unfinished.
+    /// is none, removes submissions that had not arrived whole.
     pub(crate) fn take(root: &Path) -> Result<Self, StateError> {
         make_folder(root)?;
         let lock = lock(root)?;
@@ -90,9 +98,9 @@ impl State {
             root: root.to_owned(),
             _lock: lock,
         };
-        state.clean()?;
+        remove_all(&state.root.join(COORDINATOR_FILE))?;
+        remove_all(&state.inbox())?;
         make_folder(&state.inbox())?;
-        make_folder(&state.root.join("jobs"))?;
         Ok(state)
     }
 
@@ -106,21 +114,65 @@ impl State {
 
     /// Where submissions arrive.
     pub(crate) fn inbox(&self) -> PathBuf {
-        self.root.join("inbox")
+        self.root.join("jobs").join(ARRIVING)
     }
 
-    /// A job's folders; nothing is made yet. Jobs are numbered anew at each start,
-    /// so the epoch is part of the name.
+    /// The store's file.
+    pub(crate) fn store(&self) -> PathBuf {
+        self.root.join("farm.sqlite")
+    }
+
+    /// A job's folders; nothing is made yet.
     pub(crate) fn job(&self, job: JobId) -> JobFolders {
-        let root = self
-            .root
-            .join("jobs")
-            .join(format!("{}-{job}", self.epoch.0));
-        JobFolders {
-            frames: root.join("frames"),
-            scratch: root.join("scratch"),
-            root,
+        JobFolders::at(self.root.join("jobs").join(job.to_string()))
+    }
+
+    /// Removes what no job that is there needs: folders of submissions that were cut off before they
+    /// were taken, frames that were being written, scratch files of images that nobody renders. Finished frames stay.
+    pub(crate) fn clean(
+        &self,
+        jobs: &BTreeSet<JobId>,
+        in_flight: &BTreeSet<ImageRef>,
+    ) -> Result<(), StateError> {
+        let root = self.root.join("jobs");
+        let listed = fs::read_dir(&root).map_err(io_error("list", &root))?;
+        for entry in listed {
+            let entry = entry.map_err(io_error("list", &root))?;
+            let name = entry.file_name();
+            if name == ARRIVING {
+                continue;
+            }
+            let job = name.to_str().and_then(|name| name.parse().ok()).map(JobId);
+            let job = job.filter(|job| jobs.contains(job));
+            remove_unfinished(&entry.path().join("frames"));
+            let Some(job) = job else {
+                JobFolders::at(entry.path()).forget()?;
+                continue;
+            };
+            let Ok(scratch) = fs::read_dir(entry.path().join("scratch")) else {
+                continue;
+            };
+            for file in scratch.flatten() {
+                let name = file.file_name();
+                let image = name.to_str().and_then(|name| name.parse().ok());
+                let image = image.map(|image| ImageRef {
+                    job,
+                    image: ImageNumber(image),
+                });
+                if image.is_none_or(|image| !in_flight.contains(&image)) {
+                    remove_all(&file.path())?;
+                }
+            }
         }
+        Ok(())
+    }
+
+    /// The largest number of a job that has a folder.
+    pub(crate) fn last_job_folder(&self) -> JobId {
+        let listed = fs::read_dir(self.root.join("jobs"));
+        let names = listed.into_iter().flatten().flatten();
+        let numbers = names.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
+        JobId(numbers.max().unwrap_or(0))
     }
 
     /// Says where this coordinator listens.
@@ -140,40 +192,29 @@ impl State {
         let _ = fs::remove_file(self.root.join(COORDINATOR_FILE));
         let _ = fs::remove_dir_all(self.inbox());
     }
-
-    /// Removes submissions and scratch files of earlier starts, whose jobs are
-    /// forgotten; finished frames stay.
-    fn clean(&self) -> Result<(), StateError> {
-        remove_all(&self.root.join(COORDINATOR_FILE))?;
-        remove_all(&self.inbox())?;
-        let jobs = self.root.join("jobs");
-        let listed = match fs::read_dir(&jobs) {
-            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(()),
-            listed => listed.map_err(io_error("list", &jobs))?,
-        };
-        for job in listed {
-            let job = job.map_err(io_error("list", &jobs))?.path();
-            remove_all(&job.join("scratch"))?;
-            let frames = job.join("frames");
-            remove_unfinished(&frames);
-            // Both succeed only where nothing is left inside.
-            let _ = fs::remove_dir(&frames);
-            let _ = fs::remove_dir(&job);
-        }
-        Ok(())
-    }
 }
 
 impl JobFolders {
-    /// Makes both.
+    fn at(root: PathBuf) -> Self {
+        Self {
+            frames: root.join("frames"),
+            scratch: root.join("scratch"),
+            scene: root.join("scene"),
+            root,
+        }
+    }
+
+    /// Makes those of frames and scratch files.
     pub(crate) fn make(&self) -> Result<(), StateError> {
         make_folder(&self.frames)?;
         make_folder(&self.scratch)
     }
 
-    /// Removes the scratch files, and the whole folder where it holds no frame.
-    pub(crate) fn clear(&self) -> Result<(), StateError> {
+    /// Removes all but finished frames.
+    pub(crate) fn forget(&self) -> Result<(), StateError> {
         remove_all(&self.scratch)?;
+        remove_all(&self.scene)?;
+        // Both succeed only where nothing is left inside.
         let _ = fs::remove_dir(&self.frames);
         let _ = fs::remove_dir(&self.root);
         Ok(())
@@ -343,21 +384,32 @@ mod tests {
     }
 
     #[test]
-    fn scratch_goes_and_frames_stay() {
+    fn what_no_job_needs_goes_and_frames_stay() {
         let folder = tempfile::tempdir().unwrap();
         let state = State::take(folder.path()).unwrap();
-        let (done, begun) = (state.job(JobId(1)), state.job(JobId(2)));
-        for job in [&done, &begun] {
+        let image = ImageRef {
+            job: JobId(1),
+            image: ImageNumber(0),
+        };
+        let (there, gone) = (state.job(JobId(1)), state.job(JobId(2)));
+        for job in [&there, &gone] {
             job.make().unwrap();
-            fs::write(job.scratch.join("0"), "x").unwrap();
+            make_folder(&job.scene).unwrap();
+            for image in ["0", "1"] {
+                fs::write(job.scratch.join(image), "x").unwrap();
+            }
         }
-        fs::write(done.frames.join("a_0000.exr"), "x").unwrap();
-        fs::write(done.frames.join(".a_0001.exr.part"), "x").unwrap();
-        drop(state);
-        drop(State::take(folder.path()).unwrap());
-        assert!(done.frames.join("a_0000.exr").exists());
-        assert!(!done.frames.join(".a_0001.exr.part").exists());
-        assert!(!done.scratch.exists() && !begun.root.exists());
+        fs::write(there.frames.join(".a_0001.exr.part"), "x").unwrap();
+        fs::write(gone.frames.join("a_0000.exr"), "x").unwrap();
+        state.clean(&[JobId(1)].into(), &[image].into()).unwrap();
+        assert!(there.scene.exists() && there.scratch.join("0").exists());
+        assert!(!there.scratch.join("1").exists());
+        assert!(!there.frames.join(".a_0001.exr.part").exists());
+        assert!(gone.frames.join("a_0000.exr").exists());
+        assert!(!gone.scratch.exists() && !gone.scene.exists());
+        fs::remove_file(gone.frames.join("a_0000.exr")).unwrap();
+        state.clean(&BTreeSet::new(), &BTreeSet::new()).unwrap();
+        assert!(!gone.root.exists() && !there.root.exists());
     }
 
     #[test]

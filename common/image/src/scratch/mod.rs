@@ -3,7 +3,8 @@
 //! One fixed slot per grid square that the window touches, in row order, so that a block is
 //! written at its place in whatever order it comes; the file is sparse until then. What is done
 //! is counted in pixels, so that the rest of an image may be cut into other tiles at any time.
-//! A journal beside the file lets an interrupted render go on.
+//! A journal beside the file lets an interrupted render go on; where its caller keeps a journal of its own,
+//! there is none ([`Scratch::create_bare`]).
 
 mod coverage;
 mod film;
@@ -68,7 +69,8 @@ pub struct Scratch {
 #[derive(Debug)]
 struct State {
     coverage: Coverage,
-    journal: Journal,
+    /// None where the caller keeps one.
+    journal: Option<Journal>,
 }
 
 impl Scratch {
@@ -111,6 +113,56 @@ impl Scratch {
         Ok((Self::begin(path, file, identity, window)?, opened))
     }
 
+    /// Begins the scratch file of an image anew, without a journal: its caller notes which blocks are durable.
+    ///
+    /// Fails like [`Scratch::create`].
+    pub fn create_bare(
+        path: impl Into<PathBuf>,
+        identity: ScratchIdentity,
+        window: Rect,
+    ) -> Result<Self, ImageError> {
+        let path = path.into();
+        let (file, _) = open(&path, &identity, window)?;
+        let grid = Grid::new(window);
+        write_header(&file, &path, &identity.header(window), grid)?;
+        Ok(Self::assemble(path, file, identity, grid, None))
+    }
+
+    /// Goes on with a scratch file that was begun by [`Scratch::create_bare`], of which these blocks, with
+    /// the digests of their payloads, were noted as durable. Also gives those that do not hold
+    /// any more, which are all where the file is gone or another image's.
+    ///
+    /// Fails like [`Scratch::create`].
+    pub fn reopen_bare(
+        path: impl Into<PathBuf>,
+        identity: ScratchIdentity,
+        window: Rect,
+        blocks: impl IntoIterator<Item = (Rect, Digest)>,
+    ) -> Result<(Self, Vec<Rect>), ImageError> {
+        let path = path.into();
+        let (file, found) = open(&path, &identity, window)?;
+        let grid = Grid::new(window);
+        if found == Found::This {
+            file.set_len(grid.file_bytes())
+                .map_err(|source| ImageError::io("size the scratch file", &path, source))?;
+        } else {
+            write_header(&file, &path, &identity.header(window), grid)?;
+        }
+        let mut reader = Reader::new(&file, &path, grid);
+        let mut coverage = Coverage::new(grid);
+        let mut lost = Vec::new();
+        for (block, digest) in blocks {
+            let holds = found == Found::This && reader.holds(block, digest)?;
+            match holds {
+                true => coverage.add(block),
+                false => lost.push(block),
+            }
+        }
+        let scratch = Self::assemble(path, file, identity, grid, None);
+        scratch.state().coverage = coverage;
+        Ok((scratch, lost))
+    }
+
     fn begin(
         path: PathBuf,
         file: File,
@@ -119,12 +171,9 @@ impl Scratch {
     ) -> Result<Self, ImageError> {
         let grid = Grid::new(window);
         let header = identity.header(window);
-        file.set_len(0)
-            .and_then(|()| file.write_all_at(&header, 0))
-            .and_then(|()| file.set_len(grid.file_bytes()))
-            .map_err(|source| ImageError::io("begin the scratch file", &path, source))?;
+        write_header(&file, &path, &header, grid)?;
         let journal = Journal::start(journal_path(&path), header::binding(&header))?;
-        Ok(Self::assemble(path, file, identity, grid, journal))
+        Ok(Self::assemble(path, file, identity, grid, Some(journal)))
     }
 
     fn resume(
@@ -137,20 +186,11 @@ impl Scratch {
         let binding = header::binding(&identity.header(window));
         let mut coverage = Coverage::new(grid);
         let mut blocks_lost = 0;
-        let (mut slot, mut payload) = (vec![0; SLOT_BYTES], Vec::new());
+        let mut reader = Reader::new(&file, &path, grid);
         let journal = Journal::replay(journal_path(&path), binding, |Entry { block, digest }| {
-            if !block.is_block() || !window.contains(block) {
-                blocks_lost += 1;
-                return Ok(());
-            }
-            let offset = grid.slot_offset(grid.square_of(block));
-            file.read_exact_at(&mut slot, offset)
-                .map_err(|source| ImageError::io("read back", &path, source))?;
-            grid::gather(block, &slot, &mut payload);
-            if payload_digest(&payload) == digest {
-                coverage.add(block);
-            } else {
-                blocks_lost += 1;
+            match reader.holds(block, digest)? {
+                true => coverage.add(block),
+                false => blocks_lost += 1,
             }
             Ok(())
         })?;
@@ -158,7 +198,7 @@ impl Scratch {
             return Ok((Self::begin(path, file, identity, window)?, Opened::New));
         };
         let pixels_done = coverage.done();
-        let scratch = Self::assemble(path, file, identity, grid, journal);
+        let scratch = Self::assemble(path, file, identity, grid, Some(journal));
         scratch.state().coverage = coverage;
         let opened = Opened::Resumed {
             pixels_done,
@@ -172,7 +212,7 @@ impl Scratch {
         file: File,
         identity: ScratchIdentity,
         grid: Grid,
-        journal: Journal,
+        journal: Option<Journal>,
     ) -> Self {
         Self {
             path,
@@ -204,9 +244,11 @@ impl Scratch {
         }
         self.write_slot(block, payload)
             .map_err(|source| ImageError::io("write a block to", &self.path, source))?;
-        let digest = payload_digest(payload);
         let mut state = self.state();
-        state.journal.append(Entry { block, digest })?;
+        if let Some(journal) = &mut state.journal {
+            let digest = payload_digest(payload);
+            journal.append(Entry { block, digest })?;
+        }
         state.coverage.add(block);
         Ok(())
     }
@@ -255,10 +297,10 @@ impl Scratch {
     /// Makes every block written so far durable: pixels, journal, and the files' names. Blocks may
     /// be written meanwhile.
     pub fn sync(&self) -> Result<(), ImageError> {
-        let journal = self.state().journal.file();
+        let journal = self.state().journal.as_ref().map(Journal::file);
         self.file
             .sync_data()
-            .and_then(|()| journal.sync_data())
+            .and_then(|()| journal.map_or(Ok(()), |journal| journal.sync_data()))
             .map_err(|source| ImageError::io("sync", &self.path, source))?;
         if !self.named.load(Ordering::Relaxed) {
             crate::frame::publish::sync_folder_of(&self.path)?;
@@ -297,10 +339,11 @@ impl Scratch {
         &self.path
     }
 
-    /// Removes the scratch file and its journal.
-    pub fn discard(self) -> Result<(), ImageError> {
+    /// Removes the scratch file and its journal. Whoever still holds it may read it, and nothing else.
+    pub fn discard(&self) -> Result<(), ImageError> {
         let state = self.state();
-        for path in [self.path.as_path(), state.journal.path()] {
+        let journal = state.journal.as_ref().map(Journal::path);
+        for path in std::iter::once(self.path.as_path()).chain(journal) {
             std::fs::remove_file(path).map_err(|source| ImageError::io("remove", path, source))?;
         }
         Ok(())
@@ -358,6 +401,52 @@ fn open(
         Found::Other
     };
     Ok((file, found))
+}
+
+fn write_header(
+    file: &File,
+    path: &Path,
+    header: &[u8; USED_BYTES],
+    grid: Grid,
+) -> Result<(), ImageError> {
+    file.set_len(0)
+        .and_then(|()| file.write_all_at(header, 0))
+        .and_then(|()| file.set_len(grid.file_bytes()))
+        .map_err(|source| ImageError::io("begin the scratch file", path, source))
+}
+
+/// Reads blocks back.
+struct Reader<'a> {
+    file: &'a File,
+    path: &'a Path,
+    grid: Grid,
+    slot: Vec<u8>,
+    payload: Vec<u8>,
+}
+
+impl<'a> Reader<'a> {
+    fn new(file: &'a File, path: &'a Path, grid: Grid) -> Self {
+        Self {
+            file,
+            path,
+            grid,
+            slot: vec![0; SLOT_BYTES],
+            payload: Vec::new(),
+        }
+    }
+
+    /// Whether a block of the window is there, and has this digest.
+    fn holds(&mut self, block: Rect, digest: Digest) -> Result<bool, ImageError> {
+        if !block.is_block() || !self.grid.window().contains(block) {
+            return Ok(false);
+        }
+        let offset = self.grid.slot_offset(self.grid.square_of(block));
+        self.file
+            .read_exact_at(&mut self.slot, offset)
+            .map_err(|source| ImageError::io("read back", self.path, source))?;
+        grid::gather(block, &self.slot, &mut self.payload);
+        Ok(payload_digest(&self.payload) == digest)
+    }
 }
 
 fn journal_path(path: &Path) -> PathBuf {

@@ -241,3 +241,37 @@ fn a_block_done_already_adds_nothing_to_the_journal() {
     let block = blocks(CROP, 7, 7)[0];
     assert!(scratch.write_block(block, &payload(block)).is_ok());
 }
+
+#[test]
+fn without_a_journal_its_caller_says_what_is_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bare");
+    let all = blocks(CROP, 40, 60);
+    let half = all.len() / 2;
+    let scratch = Scratch::create_bare(&path, identity(), CROP).unwrap();
+    write_all(&scratch, &all[..half]);
+    scratch.sync().unwrap();
+    drop(scratch);
+    assert!(!journal(&path).exists());
+
+    let digest = |block: &Rect| model::Digest(*blake3::hash(&payload(*block)).as_bytes());
+    let noted = || all[..half].iter().map(|block| (*block, digest(block)));
+    let (scratch, lost) = Scratch::reopen_bare(&path, identity(), CROP, noted()).unwrap();
+    assert_eq!(lost, []);
+    assert_eq!(scratch.pixels_done(), area(&all[..half]));
+    drop(scratch);
+
+    // A block that was noted and is another one on the disk is given back.
+    let wrong = noted().chain([(all[half], digest(&all[0]))]);
+    let (scratch, lost) = Scratch::reopen_bare(&path, identity(), CROP, wrong).unwrap();
+    assert_eq!(lost, [all[half]]);
+    go_on(folder.path(), &scratch);
+    scratch.discard().unwrap();
+    assert!(!path.exists());
+    drop(scratch);
+
+    // Where the file is gone, so are they all.
+    let (scratch, lost) = Scratch::reopen_bare(&path, identity(), CROP, noted()).unwrap();
+    assert_eq!(lost, all[..half]);
+    assert_eq!(scratch.pixels_done(), 0);
+}

@@ -1,19 +1,22 @@
 //! Performing effects.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 
-use image::{FrameMetadata, ScratchIdentity, ViewTransform};
-use model::{ImageNumber, JobId, SubmissionId, WorkerId};
-use sched::{BlockRef, BlockRefusal, Effect, Event, JobOutcome, RevokeReason, WorkerRefusal};
+use model::{ImageRef, JobId, SubmissionId, WorkerId};
+use sched::{
+    BlockRef, BlockRefusal, Command, Effect, Event, JobOutcome, RevokeReason, WorkerRefusal,
+};
+use store::Entry;
 use tonic::Status;
 use wire::Failure;
 use wire::proto::{self, ErrorKind, control_down, deliver_down};
 
-use super::Shell;
+use super::{Shell, Submitting};
+use crate::about::JobAbout;
 use crate::inbox::NewJob;
 use crate::job::Job;
-use crate::storage::Plan;
+use crate::storage::{Era, Plan};
 use crate::worker::Told;
 
 impl Shell {
@@ -27,7 +30,6 @@ impl Shell {
             } => {
                 let kind = match refusal {
                     sched::SubmitRefusal::SubmissionReused => ErrorKind::Conflict,
-                    sched::SubmitRefusal::WrongRevision { .. } => ErrorKind::WrongRevision,
                     _ if refusal.is_retryable() => ErrorKind::Limit,
                     _ => ErrorKind::BadRequest,
                 };
@@ -81,34 +83,30 @@ impl Shell {
                 block,
                 refusal,
             } => self.refuse_block(worker, block, refusal),
-            Effect::Encode { image } => {
-                if let Some(job) = self.jobs.get_mut(image.job) {
-                    let counters = job.take_counters(image.image);
-                    let plan = job.plan.clone();
-                    self.storage.encode(plan, image, counters);
-                }
-                self.jobs.touch_image(image);
-            }
+            Effect::Encode { image } => self.encode(image, self.era(image)),
             Effect::GiveUp { image, reason } => self.feed(Event::ImageFailed { image, reason }),
             Effect::Incident {
                 block,
                 worker,
                 other,
             } => self.incident(block, worker, other),
-            Effect::Commanded { .. } => {}
-            Effect::CommandRefused { refusal, .. } => self.refused = Some(refusal),
+            Effect::Commanded { job } => self.commanded(job, None),
+            Effect::CommandRefused { job, refusal } => self.commanded(job, Some(refusal)),
             Effect::DropScratch { image } => {
                 if let Some(job) = self.jobs.get_mut(image.job) {
-                    job.take_counters(image.image);
-                    self.storage.drop_scratch(&job.plan, image);
+                    job.take_work(image.image);
                 }
+                self.storage.drop_scratch(image);
                 self.jobs.touch_image(image);
             }
-            Effect::DropJob { job } => self.clear_job(job),
-            Effect::JobDone { job, outcome } => self.job_done(job, outcome),
-            Effect::ForgetJob { job } => {
-                self.jobs.remove(job);
+            Effect::DropJob { job } => {
+                if let Some(job) = self.jobs.get(job) {
+                    job.plan.cancelled.store(true, Ordering::Relaxed);
+                    self.storage.forget(job.folders().clone());
+                }
             }
+            Effect::JobDone { job, outcome } => self.job_done(job, outcome),
+            Effect::ForgetJob { job } => self.forget_job(job),
             Effect::JobChanged { job } => {
                 self.jobs.touch(job);
                 self.tell_of_attempts(job);
@@ -122,78 +120,114 @@ impl Shell {
     }
 
     fn submitted(&mut self, submission: SubmissionId, id: JobId) {
-        let Some((_, new, reply)) = self
-            .submitting
-            .take_if(|(waiting, _, _)| *waiting == submission)
-        else {
+        let Some(waiting) = self.waiting_submission(submission) else {
             return;
         };
-        let answer = match self.jobs.get(id) {
-            Some(known) if known.formats() == new.formats && known.submission == submission => {
-                Ok(proto::Submitted {
-                    job: id.0,
-                    again: true,
-                })
-            }
-            Some(_) => Err(Failure::new(
+        let again = waiting.again;
+        let known = self.jobs.get(id);
+        let same = known.is_some_and(|known| known.formats() == waiting.formats);
+        let answer = match same || !again {
+            true => Ok(proto::Submitted { job: id.0, again }),
+            false => Err(Failure::new(
                 ErrorKind::Conflict,
                 sched::SubmitRefusal::SubmissionReused.to_string(),
             )),
-            None => self.begin_job(id, *new),
         };
-        let _ = reply.send(answer);
+        if !again && let Some(view) = self.sched.job(id) {
+            let (name, frames, scene) = (view.name, view.frames, view.scene);
+            tracing::info!(job = %id, name, %frames, %scene, "a job is submitted");
+            self.say(id, format!("submitted: frames {frames}"));
+        }
+        let _ = waiting.reply.send(answer);
     }
 
-    fn begin_job(&mut self, id: JobId, new: NewJob) -> Result<proto::Submitted, Failure> {
-        let plan = self.plan(id, &new);
-        if let Err(error) = plan.folders.make() {
-            // The job's blocks will fail for the same reason, and say so in its log.
-            tracing::error!(job = %id, "{}", crate::storage::chain(&error));
-        }
+    fn waiting_submission(&mut self, submission: SubmissionId) -> Option<Submitting> {
+        let is_it = |waiting: &Submitting| waiting.submission == submission;
+        let place = self.submitting.iter().position(is_it)?;
+        self.submitting.remove(place)
+    }
+
+    /// Takes the submission that is being fed as a job, if that is what became of it; gives what is to be committed.
+    pub(super) fn begin_job(
+        &mut self,
+        unix_ms: u64,
+        submission: sched::Submission,
+    ) -> Option<Entry> {
+        let job = self.sched.submitted(submission.submission)?;
+        let new = self.arriving.take_if(|_| self.jobs.get(job).is_none())?;
         let NewJob {
-            submission, upload, ..
-        } = new;
-        tracing::info!(job = %id, name = submission.name, frames = %submission.frames, scene = %submission.scene, "a job is submitted");
+            description,
+            upload,
+            formats,
+            settings,
+            ..
+        } = *new;
+        let film = &description.film;
+        let folders = self.state.job(job);
+        let scene = upload.files_at(folders.scene.clone());
+        let about = JobAbout {
+            stem: stem(&submission.name, &description.name),
+            formats: formats.iter().map(|format| format.to_string()).collect(),
+            settings,
+            resolution: (film.resolution.width, film.resolution.height),
+            frames_per_second: film.fps,
+            exposure_stops: film.exposure,
+            software: self.config.build.clone(),
+            assets: scene.assets.iter().map(ToString::to_string).collect(),
+        };
+        let plan = Plan::new(folders.clone(), &submission, &about, formats);
         let lines = self.config.limits.log_lines_max;
-        self.jobs.insert(
-            id,
-            Job::new(Arc::new(plan), upload, submission.submission, lines),
-        );
-        self.say(id, format!("submitted: frames {}", submission.frames));
-        Ok(proto::Submitted {
-            job: id.0,
-            again: false,
+        let known = Job::new(Arc::new(plan), scene, lines);
+        self.jobs.insert(job, known);
+        self.storage.adopt(upload, folders);
+        Some(Entry::Submitted {
+            job,
+            unix_ms,
+            submission,
+            about: serde_json::to_string(&about).expect("it is JSON"),
         })
     }
 
-    /// How the images of a new job are stored.
-    fn plan(&self, id: JobId, new: &NewJob) -> Plan {
-        let film = &new.description.film;
-        Plan {
-            folders: self.state.job(id),
-            stem: stem(&new.submission.name, &new.description.name),
-            formats: new.formats,
-            identity: ScratchIdentity {
-                scene: new.submission.scene,
-                revision: new.submission.revision.0,
-                image: ImageNumber(0),
-                resolution: film.resolution,
-            },
-            window: film.window,
-            metadata: FrameMetadata {
-                scene_digest: new.submission.scene,
-                revision: new.submission.revision.0,
-                settings: new.settings.clone(),
-                statistics: String::new(),
-                software: self.config.build.clone(),
-                frames_per_second: film.fps,
-                comments: String::new(),
-            },
-            view: ViewTransform {
-                exposure_stops: film.exposure,
-            },
-            cancelled: AtomicBool::new(false),
+    /// Has a complete image encoded.
+    pub(super) fn encode(&mut self, image: ImageRef, era: Era) {
+        if let Some(job) = self.jobs.get(image.job) {
+            let counters = job.work(image.image).counters;
+            self.storage.encode(job.plan.clone(), image, counters, era);
         }
+        self.jobs.touch_image(image);
+    }
+
+    /// Answers the oldest command that is not answered.
+    fn commanded(&mut self, id: JobId, refusal: Option<sched::CommandRefusal>) {
+        let Some(waiting) = self.commanding.pop_front() else {
+            return;
+        };
+        let answer = match refusal {
+            Some(refusal) => Err(Failure::new(ErrorKind::BadRequest, refusal.to_string())),
+            None => {
+                let said = match waiting.command {
+                    Command::Pause => "paused by its user".to_owned(),
+                    Command::Resume => "resumed by its user".to_owned(),
+                    Command::Priority(priority) => format!("its priority is {priority} now"),
+                    _ => String::new(),
+                };
+                if !said.is_empty() {
+                    self.say(id, said);
+                }
+                Ok(self.summary(id).unwrap_or(waiting.before))
+            }
+        };
+        let _ = waiting.reply.send(answer);
+    }
+
+    /// Nothing is kept of a job but its finished frames.
+    fn forget_job(&mut self, id: JobId) {
+        let Some(job) = self.jobs.remove(id) else {
+            return;
+        };
+        self.eras.retain(|image, _| image.job != id);
+        self.storage.record(Entry::Forgotten { job: id }, None);
+        self.storage.forget(job.folders().clone());
     }
 
     fn answer_submission(
@@ -201,12 +235,8 @@ impl Shell {
         submission: SubmissionId,
         answer: Result<proto::Submitted, Failure>,
     ) {
-        let waiting = self
-            .submitting
-            .take_if(|(waiting, _, _)| *waiting == submission);
-        if let Some((_, new, reply)) = waiting {
-            drop(new);
-            let _ = reply.send(answer);
+        if let Some(waiting) = self.waiting_submission(submission) {
+            let _ = waiting.reply.send(answer);
         }
     }
 
@@ -277,7 +307,6 @@ impl Shell {
             );
         }
         self.say(id, format!("the job is {words}"));
-        self.clear_job(id);
         if let Some(job) = self.jobs.get_mut(id) {
             // No event of its own told of images that were never begun.
             for image in self.sched.images(id) {
@@ -287,24 +316,6 @@ impl Shell {
             }
         }
         self.jobs.touch(id);
-    }
-
-    /// Removes what a job that is over leaves beside its frames.
-    fn clear_job(&mut self, id: JobId) {
-        let cancelled = sched::JobState::Over(JobOutcome::Cancelled);
-        let is_cancelled = self.sched.job(id).is_none_or(|job| job.state == cancelled);
-        let Some(job) = self.jobs.get_mut(id) else {
-            return;
-        };
-        // Nobody can ask for a retry yet, which would need the scene again.
-        if let Some(upload) = job.upload.take() {
-            self.storage.remove(upload);
-        }
-        if is_cancelled {
-            job.plan.cancelled.store(true, Ordering::Relaxed);
-        }
-        let folders = job.folders().clone();
-        self.storage.clear(folders);
     }
 
     /// Two workers made different pixels of one block.
@@ -377,7 +388,12 @@ impl Shell {
     pub(super) fn say(&mut self, id: JobId, text: String) {
         let now = self.unix_ms_now();
         if let Some(job) = self.jobs.get_mut(id) {
-            job.say(now, &text);
+            let line = Entry::Line {
+                job: id,
+                unix_ms: now,
+                text: job.say(now, &text),
+            };
+            self.storage.record(line, None);
             self.jobs.touch(id);
         }
     }

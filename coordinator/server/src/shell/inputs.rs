@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 
 use model::{ImageRef, JobId, WorkerId};
-use sched::{Command, Event, LinkId, Offer, Verdict};
+use sched::{BlockRefusal, Command, Event, LinkId, Offer, Verdict};
 use wire::proto::{self, ErrorKind, deliver_down};
 use wire::{Failure, convert};
 
-use super::{Next, Shell};
+use super::{Commanding, Next, Shell, Submitting};
 use crate::inbox::NewJob;
 use crate::input::{Arrived, Greeting, Input, Link, Reply};
 use crate::job::Sign;
-use crate::storage::{Encoded, Refusal, Stored};
+use crate::storage::{Encoded, Stored};
 use crate::worker::Worker;
 
 impl Shell {
@@ -19,9 +19,7 @@ impl Shell {
     pub(super) fn take(&mut self, input: Input) -> Next {
         match input {
             Input::Submit(new, reply) => self.submit(new, reply),
-            Input::Command(job, command, reply) => {
-                let _ = reply.send(self.command(job, command));
-            }
+            Input::Command(job, command, reply) => self.command(job, command, reply),
             Input::Ask(query) => self.answer(query),
             Input::Hello(greeting) => self.greet(*greeting),
             Input::Said {
@@ -50,7 +48,15 @@ impl Shell {
                     self.stored(stored);
                 }
             }
+            Input::Committed(ticket) => self.committed(ticket),
             Input::Encoded(encoded) => self.encoded(encoded),
+            Input::Trouble(trouble) => self.disk_says(trouble),
+            Input::Broken(sentence) => {
+                tracing::error!(
+                    "the coordinator stops, since its store can be used no more: {sentence}"
+                );
+                return Next::Stop;
+            }
             Input::Stop => return Next::Stop,
         }
         Next::GoOn
@@ -58,12 +64,16 @@ impl Shell {
 
     fn submit(&mut self, new: Box<NewJob>, reply: Reply<proto::Submitted>) {
         let submission = new.submission.clone();
-        self.submitting = Some((submission.submission, new, reply));
+        self.submitting.push_back(Submitting {
+            submission: submission.submission,
+            formats: new.formats,
+            again: self.sched.submitted(submission.submission).is_some(),
+            reply,
+        });
+        self.arriving = Some(new);
         self.feed(Event::Submit(submission));
-        if let Some((_, _, reply)) = self.submitting.take() {
-            let mistake = "the scheduler did not answer the submission";
-            let _ = reply.send(Err(Failure::new(ErrorKind::Internal, mistake)));
-        }
+        // What became no job is removed.
+        self.arriving = None;
     }
 
     fn greet(&mut self, greeting: Greeting) {
@@ -139,23 +149,43 @@ impl Shell {
     }
 
     /// Does what a user wants of a job; answers with the job as it is then, or was where it is forgotten.
-    fn command(&mut self, job: JobId, command: Command) -> Result<proto::JobSummary, Failure> {
-        let before = self.summary(job).ok_or_else(|| super::views::no_job(job))?;
-        self.refused = None;
-        self.feed(Event::Command { job, command });
-        if let Some(refusal) = self.refused.take() {
-            return Err(Failure::new(ErrorKind::BadRequest, refusal.to_string()));
-        }
-        let said = match command {
-            Command::Pause => "paused by its user".to_owned(),
-            Command::Resume => "resumed by its user".to_owned(),
-            Command::Priority(priority) => format!("its priority is {priority} now"),
-            _ => String::new(),
+    fn command(&mut self, job: JobId, command: Command, reply: Reply<proto::JobSummary>) {
+        let Some(before) = self.summary(job) else {
+            let _ = reply.send(Err(super::views::no_job(job)));
+            return;
         };
-        if !said.is_empty() {
-            self.say(job, said);
+        self.commanding.push_back(Commanding {
+            command,
+            before,
+            reply,
+        });
+        self.feed(Event::Command { job, command });
+    }
+
+    /// The disk waits to be tried again, or is well again. While it waits nobody is late.
+    fn disk_says(&mut self, trouble: Option<String>) {
+        let said = match &trouble {
+            Some(sentence) => {
+                tracing::error!("the disk is in trouble, everything waits for it: {sentence}");
+                self.clock.hold();
+                format!("the coordinator waits for its disk: {sentence}")
+            }
+            None => {
+                tracing::info!("the disk is well again");
+                self.clock.release();
+                "the coordinator's disk is well again".to_owned()
+            }
+        };
+        self.trouble = trouble;
+        let running: Vec<_> = self
+            .sched
+            .jobs()
+            .filter(|job| job.state == sched::JobState::Running)
+            .map(|job| job.job)
+            .collect();
+        for job in running {
+            self.say(job, said.clone());
         }
-        Ok(self.summary(job).unwrap_or(before))
     }
 
     fn open_delivery(
@@ -185,7 +215,10 @@ impl Shell {
         let (worker, block) = (arrived.worker, arrived.block);
         match self.sched.accepts(worker, block) {
             Verdict::Accept => match self.jobs.get(block.image.job) {
-                Some(job) => self.storage.store(job.plan.clone(), arrived),
+                Some(job) => {
+                    let era = self.era(block.image);
+                    self.storage.store(job.plan.clone(), arrived, era);
+                }
                 None => tracing::error!(?block, "a block of a job that is not known"),
             },
             Verdict::AlreadyDone => self.feed(Event::BlockStored {
@@ -199,7 +232,11 @@ impl Shell {
     }
 
     fn stored(&mut self, stored: Stored) {
-        let Stored { arrived, result } = stored;
+        let Stored {
+            arrived,
+            era,
+            result,
+        } = stored;
         let Arrived {
             worker,
             block,
@@ -208,42 +245,39 @@ impl Shell {
             counters,
             ..
         } = arrived;
-        match result {
-            Ok(()) => {
-                self.count(block.image, &counters, Sign::Plus);
-                let before = self.blocks_done(block.image.job);
-                self.jobs.touch_image(block.image);
-                self.feed(Event::BlockStored {
-                    worker,
-                    block,
-                    elapsed,
-                    pixels,
-                });
-                // Another attempt's had made its pixels durable, or nobody wants them.
-                if self.blocks_done(block.image.job) == before {
-                    self.count(block.image, &counters, Sign::Minus);
-                }
+        let image = block.image;
+        if let Err(reason) = result {
+            let message = deliver_down::Message::Refused(proto::Refused {
+                attempt: Some(block.attempt.into()),
+                block: Some(block.rect.into()),
+                error: Some(Failure::new(ErrorKind::BadRequest, &*reason).detail()),
+            });
+            if let Some(worker) = self.workers.get_mut(&worker) {
+                worker.answer(message);
             }
-            Err(Refusal::Pixels(reason)) => {
-                let message = deliver_down::Message::Refused(proto::Refused {
-                    attempt: Some(block.attempt.into()),
-                    block: Some(block.rect.into()),
-                    error: Some(Failure::new(ErrorKind::BadRequest, &*reason).detail()),
-                });
-                if let Some(worker) = self.workers.get_mut(&worker) {
-                    worker.answer(message);
-                }
-            }
-            Err(Refusal::Disk(reason)) => {
-                tracing::error!(job = %block.image.job, image = %block.image.image, reason, "a block could not be stored");
-                self.fail_image(block.image, reason);
-            }
+            return;
         }
-    }
-
-    fn count(&mut self, image: ImageRef, counters: &[(String, u64)], sign: Sign) {
-        if let Some(job) = self.jobs.get_mut(image.job) {
-            job.count(image.image, counters, sign);
+        if era != self.era(image) {
+            // Its pixels went with the scratch file that they were written to.
+            return self.refuse_block(worker, block, BlockRefusal::AttemptDead);
+        }
+        let count = |shell: &mut Self, sign| {
+            if let Some(job) = shell.jobs.get_mut(image.job) {
+                job.count(image.image, elapsed, &counters, sign);
+            }
+        };
+        count(self, Sign::Plus);
+        let before = self.blocks_done(image.job);
+        self.jobs.touch_image(image);
+        self.feed(Event::BlockStored {
+            worker,
+            block,
+            elapsed,
+            pixels,
+        });
+        // Another attempt's had made its pixels durable, or nobody wants them.
+        if self.blocks_done(image.job) == before {
+            count(self, Sign::Minus);
         }
     }
 
@@ -252,10 +286,13 @@ impl Shell {
     }
 
     fn encoded(&mut self, encoded: Encoded) {
-        let Encoded { image, result } = encoded;
+        let Encoded { image, era, result } = encoded;
+        if era != self.era(image) {
+            return;
+        }
         match result {
             Ok(frame) => {
-                let files = frame.files.into_iter().map(super::views::file).collect();
+                let files = frame.files.iter().map(super::views::file).collect();
                 let film = frame.film_digest;
                 if let Some(job) = self.jobs.get_mut(image.job) {
                     job.files.insert(image.image, files);
@@ -266,7 +303,7 @@ impl Shell {
                     );
                 }
                 self.jobs.touch_image(image);
-                self.feed(Event::ImageEncoded { image, film });
+                self.feed_with(Event::ImageEncoded { image, film }, &frame.files);
             }
             Err(reason) => self.fail_image(image, reason),
         }

@@ -3,17 +3,24 @@
 //!
 //! It never waits for anything but its inputs: messages to workers are dropped with their
 //! link where they do not fit, the disk works on threads of its own.
+//!
+//! What is durable comes before what is said. A block is written, synced and committed before the scheduler hears of it. Any
+//! other durable event is told first, and its effects wait, with all later ones behind them, until it
+//! is committed (`hold`).
 
 mod effects;
+mod hold;
 mod inputs;
 mod queries;
+mod recall;
 mod views;
 
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use model::{SubmissionId, Timestamp};
-use sched::{Effect, Event, Sched};
+use model::{ImageRef, SubmissionId, Timestamp};
+use sched::{Command, Event, Sched};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 use wire::proto;
@@ -24,8 +31,11 @@ use crate::inbox::NewJob;
 use crate::input::{Input, Reply};
 use crate::job::Jobs;
 use crate::state::State;
-use crate::storage::Storage;
+use crate::storage::{Era, Storage};
 use crate::worker::Workers;
+
+use self::hold::Held;
+pub(crate) use self::recall::Kept;
 
 /// How often watchers are told of changes, at most.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
@@ -47,11 +57,36 @@ pub(crate) struct Shell {
     storage: Storage,
     jobs: Jobs,
     workers: Workers,
-    /// The submission that is being fed, until the scheduler has answered.
-    submitting: Option<(SubmissionId, Box<NewJob>, Reply<proto::Submitted>)>,
-    /// Why the command that was just fed is refused, if it is.
-    refused: Option<sched::CommandRefusal>,
-    effects: Vec<Effect>,
+    /// Submissions that were fed and are not answered, in order.
+    submitting: VecDeque<Submitting>,
+    /// The submission that is being fed, until it is a job.
+    arriving: Option<Box<NewJob>>,
+    /// Commands that were fed and are not answered, in order.
+    commanding: VecDeque<Commanding>,
+    held: Held,
+    /// Eras of images that are not in their first.
+    eras: BTreeMap<ImageRef, Era>,
+    /// What the disk waits for, while it does.
+    trouble: Option<String>,
+}
+
+/// A submission on its way.
+#[derive(Debug)]
+struct Submitting {
+    submission: SubmissionId,
+    formats: image::Formats,
+    /// Whether it was a job already.
+    again: bool,
+    reply: Reply<proto::Submitted>,
+}
+
+/// A command on its way.
+#[derive(Debug)]
+struct Commanding {
+    command: Command,
+    /// The job as it was before.
+    before: proto::JobSummary,
+    reply: Reply<proto::JobSummary>,
 }
 
 /// Whether the loop goes on.
@@ -85,9 +120,12 @@ impl Shell {
             storage,
             jobs: Jobs::default(),
             workers: Workers::new(),
-            submitting: None,
-            refused: None,
-            effects: Vec::new(),
+            submitting: VecDeque::new(),
+            arriving: None,
+            commanding: VecDeque::new(),
+            held: Held::default(),
+            eras: BTreeMap::new(),
+            trouble: None,
         }
     }
 
@@ -96,9 +134,9 @@ impl Shell {
         let mut watch_at: Option<Instant> = None;
         let mut since_tick = 0;
         loop {
-            let tick_at = self
-                .sched
-                .next_deadline()
+            let deadline = self.sched.next_deadline();
+            let tick_at = deadline
+                .filter(|_| !self.clock.is_held())
                 .map(|deadline| self.clock.instant(deadline));
             let tick_is_overdue =
                 since_tick >= INPUTS_BEFORE_TICK && tick_at.is_some_and(|at| at <= Instant::now());
@@ -132,25 +170,12 @@ impl Shell {
         self.end().await;
     }
 
-    /// Lets the scheduler decide, and performs what it decided.
-    fn feed(&mut self, event: Event) {
-        let now = self.now();
-        tracing::debug!(?event, "event");
-        let mut effects = std::mem::take(&mut self.effects);
-        self.sched.handle(now, event, &mut effects);
-        for effect in effects.drain(..) {
-            tracing::debug!(?effect, "effect");
-            self.perform(effect);
-        }
-        self.effects = effects;
-    }
-
     fn now(&self) -> Timestamp {
         self.clock.now()
     }
 
     fn unix_ms_now(&self) -> u64 {
-        self.clock.unix_ms(self.now())
+        self.clock.unix_ms_now()
     }
 
     fn tell_watchers(&mut self) {
@@ -172,23 +197,11 @@ impl Shell {
         }
     }
 
-    /// Tells everybody that the coordinator stops, and leaves no scratch file behind.
+    /// Tells everybody that the coordinator stops; jobs go on at the next start.
     async fn end(mut self) {
         self.tell_watchers();
         self.dismiss_workers();
-        let Self {
-            storage,
-            jobs,
-            state,
-            ..
-        } = self;
-        for (_, job) in jobs.iter() {
-            job.plan
-                .cancelled
-                .store(true, std::sync::atomic::Ordering::Relaxed);
-            storage.clear(job.folders().clone());
-        }
-        drop(jobs);
+        let Self { storage, state, .. } = self;
         let finished = tokio::task::spawn_blocking(move || storage.finish());
         if finished.await.is_err() {
             tracing::error!("the storage threads could not be ended");

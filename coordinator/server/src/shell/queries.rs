@@ -6,6 +6,7 @@ use wire::Failure;
 use wire::proto::{self, ErrorKind};
 
 use super::{Shell, views};
+use crate::clock::unix_ms;
 use crate::input::{Query, Snapshot, Wanted};
 use crate::job::IMAGES_PER_MESSAGE;
 
@@ -40,9 +41,7 @@ impl Shell {
             Query::Workers(reply) => {
                 let workers = self.sched.workers();
                 let workers = workers
-                    .map(|view| {
-                        views::worker_status(&self.clock, &view, self.workers.get(&view.worker))
-                    })
+                    .map(|view| views::worker_status(&view, self.workers.get(&view.worker)))
                     .collect();
                 let _ = reply.send(Ok(proto::WorkerList { workers }));
             }
@@ -58,7 +57,7 @@ impl Shell {
     /// A job in one line.
     pub(super) fn summary(&self, id: JobId) -> Option<proto::JobSummary> {
         let view = self.sched.job(id)?;
-        Some(views::summary(&self.clock, &view, self.jobs.get(id)?))
+        Some(views::summary(&view, self.jobs.get(id)?))
     }
 
     /// Why a job, or an image of it, is not finished.
@@ -74,6 +73,11 @@ impl Shell {
                 };
                 why.ok_or_else(no_image)?.to_string()
             }
+        };
+        // Nothing else matters while nothing can be kept.
+        let sentence = match &self.trouble {
+            Some(trouble) => format!("the coordinator waits for its disk: {trouble}"),
+            None => sentence,
         };
         Ok(proto::WhyReply { sentence })
     }
@@ -143,16 +147,16 @@ impl Shell {
     }
 
     fn bytes(&self, digest: Digest, wanted: Wanted) -> Result<PathBuf, Failure> {
-        let mut uploads = self.jobs.iter().filter_map(|(_, job)| job.upload.as_ref());
-        let path = uploads.find_map(|upload| match wanted {
-            Wanted::Scene => upload.scene(digest),
-            Wanted::Asset => upload.asset(digest),
+        let mut scenes = self.jobs.iter().map(|(_, job)| &job.scene);
+        let path = scenes.find_map(|scene| match wanted {
+            Wanted::Scene => scene.scene(digest),
+            Wanted::Asset => scene.asset(digest),
         });
         let what = match wanted {
             Wanted::Scene => "scene",
             Wanted::Asset => "asset",
         };
-        path.ok_or_else(|| not_found(format!("no job that is not over has the {what} {digest}")))
+        path.ok_or_else(|| not_found(format!("no job has the {what} {digest}")))
     }
 
     fn info(&self) -> proto::FarmInfo {
@@ -167,7 +171,7 @@ impl Shell {
             protocol_max: wire::version::PROTOCOL_MAX,
             revision: self.config.revision.0,
             epoch: self.state.epoch().0,
-            started_unix_ms: self.clock.unix_ms(model::Timestamp(0)),
+            started_unix_ms: unix_ms(self.clock.started()),
             jobs: count(self.jobs.len()),
             workers_connected: count(connected.count()),
         }

@@ -7,7 +7,7 @@ use sched::{ImageFailure, ImageView, JobOutcome, JobView, Sched, WorkerView};
 use wire::Failure;
 use wire::proto::{self, ErrorKind};
 
-use crate::clock::Clock;
+use crate::clock::unix_ms;
 use crate::job::Job;
 use crate::worker::Worker;
 
@@ -15,12 +15,12 @@ use crate::worker::Worker;
 pub(super) fn no_job(job: JobId) -> Failure {
     Failure::new(
         ErrorKind::NotFound,
-        format!("there is no job {job}; jobs live in memory, until the coordinator stops"),
+        format!("there is no job {job}; `flyby job list` shows those there are"),
     )
 }
 
 /// A job in one line.
-pub(super) fn summary(clock: &Clock, view: &JobView<'_>, job: &Job) -> proto::JobSummary {
+pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
     let resolution = job.plan.identity.resolution;
     let state = match view.state {
         sched::JobState::Running => proto::JobState::Running,
@@ -41,9 +41,9 @@ pub(super) fn summary(clock: &Clock, view: &JobView<'_>, job: &Job) -> proto::Jo
         blocks_done: view.blocks_done,
         blocks_again: view.blocks_again,
         pixels_again: view.pixels_again,
-        submitted_unix_ms: clock.unix_ms(view.submitted),
-        started_unix_ms: view.started.map_or(0, |at| clock.unix_ms(at)),
-        finished_unix_ms: view.ended.map_or(0, |at| clock.unix_ms(at)),
+        submitted_unix_ms: unix_ms(view.submitted),
+        started_unix_ms: view.started.map_or(0, unix_ms),
+        finished_unix_ms: view.ended.map_or(0, unix_ms),
         description_digest: view.scene.0.to_vec(),
         width: resolution.width,
         height: resolution.height,
@@ -144,7 +144,7 @@ pub(super) fn status(
 }
 
 /// A finished file.
-pub(super) fn file(file: image::FinishedFile) -> proto::FrameFile {
+pub(super) fn file(file: &image::FinishedFile) -> proto::FrameFile {
     let name = file.path.file_name().unwrap_or_default();
     proto::FrameFile {
         format: crate::grpc::format_message(file.format).into(),
@@ -155,11 +155,7 @@ pub(super) fn file(file: image::FinishedFile) -> proto::FrameFile {
 }
 
 /// A worker as it stands.
-pub(super) fn worker_status(
-    clock: &Clock,
-    view: &WorkerView,
-    known: Option<&Worker>,
-) -> proto::WorkerStatus {
+pub(super) fn worker_status(view: &WorkerView, known: Option<&Worker>) -> proto::WorkerStatus {
     let state = match view.link {
         sched::Link::Open => proto::WorkerState::Connected,
         sched::Link::Closed => proto::WorkerState::Away,
@@ -181,7 +177,7 @@ pub(super) fn worker_status(
         build: about.build,
         attempts: view.attempts,
         blocks: view.blocks,
-        heard_unix_ms: clock.unix_ms(view.heard),
+        heard_unix_ms: unix_ms(view.heard),
         credit: view.credit,
         render_us: view.render_time.0,
         revision: view.revision.0,

@@ -98,9 +98,7 @@ impl Farm {
     /// Everything below the folders of jobs and submissions, hidden files too.
     pub(crate) fn left(&self) -> Vec<PathBuf> {
         let mut left = Vec::new();
-        for folder in ["jobs", "inbox"] {
-            walk(&self.folder.path().join(folder), &mut left);
-        }
+        walk(&self.folder.path().join("jobs"), &mut left);
         left.sort();
         left
     }
