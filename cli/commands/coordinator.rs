@@ -44,8 +44,8 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         let running = server::start(config).await.map_err(not_started)?;
         let address = running.address();
         daemon::say_started(context.output, &Started::coordinator(address, &state))?;
-        stop.wait().await;
-        running.shutdown().await;
+        let ended = running.run_until(stop.wait()).await;
+        ended.map_err(|broken| Error::failed("the coordinator had to stop").because(broken))?;
         Ok(Ending::Done)
     })
 }

@@ -89,6 +89,8 @@ fn finished_paused_and_cancelled_jobs_stay_what_they_are() {
 
     let again = farm.job(finished);
     assert_eq!(again.film_digests(), done.film_digests());
+    // Who watches it is told that it is over, and waits for nothing.
+    farm.flyby(["job", "watch", &finished.to_string()]).ok();
     for number in ["pixels_done", "blocks_done", "submitted_unix_ms"] {
         assert_eq!(again.number(number), done.number(number), "{number}");
     }

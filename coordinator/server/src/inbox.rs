@@ -53,13 +53,11 @@ impl Upload {
         }
     }
 
-    /// Moves everything to where it is to stay, and makes that durable. May be tried again.
+    /// Moves everything to where it is to stay, and makes that durable; the files are since they arrived. May
+    /// be tried again.
     pub(crate) fn move_to(&self, root: &Path) -> std::io::Result<()> {
         let from = &self.files.root;
         if from.is_dir() {
-            for entry in std::fs::read_dir(from)? {
-                std::fs::File::open(entry?.path())?.sync_all()?;
-            }
             std::fs::File::open(from)?.sync_all()?;
             std::fs::rename(from, root)?;
         }
@@ -293,7 +291,7 @@ async fn receive_asset(
         hasher.update(&part.data);
         file.write_all(&part.data).await.map_err(storage)?;
     }
-    file.flush().await.map_err(storage)?;
+    file.sync_all().await.map_err(storage)?;
     if *hasher.finalize().as_bytes() == asset.digest.0 {
         Ok(())
     } else {
@@ -308,7 +306,9 @@ async fn receive_asset(
 }
 
 async fn write(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    tokio::fs::write(path, bytes).await.map_err(storage)
+    let mut file = File::create(path).await.map_err(storage)?;
+    file.write_all(bytes).await.map_err(storage)?;
+    file.sync_all().await.map_err(storage)
 }
 
 async fn next(parts: &mut Streaming<proto::SubmitPart>) -> Result<Option<Part>, Failure> {

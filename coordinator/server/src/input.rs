@@ -14,12 +14,12 @@ use wire::proto;
 
 use crate::about::counters_bytes;
 use crate::inbox::NewJob;
-use crate::storage::{Encoded, Stored, Ticket};
+use crate::storage::{Encoded, Hand, Stored, Ticket};
 
 /// Where an answer goes; whoever asked may have left.
 pub(crate) type Reply<T> = oneshot::Sender<Result<T, Failure>>;
 
-/// What the loop waits for. Each is small, or carries what its sender's limits bound.
+/// What others bring to the loop. Each is small, or carries what its sender's limits bound.
 #[derive(Debug)]
 pub(crate) enum Input {
     /// A submission has arrived whole.
@@ -59,14 +59,19 @@ pub(crate) enum Input {
         /// Which stream.
         link: LinkId,
     },
+}
+
+/// What the loop is told by the coordinator itself; heard before anything else, and even when others must wait.
+#[derive(Debug)]
+pub(crate) enum News {
     /// Blocks are durable, or no film's.
     Stored(Vec<Stored>),
     /// Every record up to this one is durable.
     Committed(Ticket),
     /// An image is encoded, or could not be.
     Encoded(Encoded),
-    /// The disk waits to be tried again, or is well again.
-    Trouble(Option<String>),
+    /// A thread of the disk waits for it to be tried again, or waits no more.
+    Trouble(Hand, Option<String>),
     /// The store can be used no more.
     Broken(String),
     /// End: tell everybody, and leave the loop.

@@ -313,6 +313,10 @@ impl Jobs {
         self.by_id.iter().map(|(id, job)| (*id, job))
     }
 
+    pub(crate) fn iter_mut(&mut self) -> impl Iterator<Item = (JobId, &mut Job)> {
+        self.by_id.iter_mut().map(|(id, job)| (*id, job))
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.by_id.len()
     }

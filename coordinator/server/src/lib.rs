@@ -6,8 +6,8 @@
 //! - `state`: the state folder, its lock, token and epoch.
 //! - `grpc`: messages in and out; here generated types begin and end.
 //! - `inbox`: submissions as they arrive, checked against their digests.
-//! - `storage`: a thread that writes blocks at their place and makes them durable, many at a
-//!   time, and one that encodes finished images.
+//! - `storage`: a thread that writes blocks at their place, makes them durable and keeps the store, and one
+//!   that encodes finished images. `about`, `scene_files`: what else is kept of a job.
 //! - `job`, `worker`: what is known of them beside what the scheduler knows: log, files,
 //!   watchers; links.
 //!
@@ -28,5 +28,5 @@ mod storage;
 mod worker;
 
 pub use config::{Config, Limits};
-pub use start::{Running, StartError, start};
+pub use start::{Running, StartError, StoreBroken, start};
 pub use state::StateError;

@@ -16,10 +16,13 @@ use wire::auth::Token;
 use crate::clock::Clock;
 use crate::config::Config;
 use crate::grpc::{self, Door};
-use crate::input::Input;
+use crate::input::{Input, News};
 use crate::shell::{Kept, Shell};
 use crate::state::{State, StateError};
 use crate::storage::Storage;
+
+/// News that wait for the loop; whoever has more waits.
+const NEWS_MAX: usize = 64;
 
 /// How long open streams may take to end once everybody was told that the coordinator stops.
 const STOP_TIMEOUT: Duration = Duration::from_secs(5);
@@ -68,6 +71,11 @@ pub enum StartError {
     Thread(#[source] io::Error),
 }
 
+/// The store failed in a way that will not pass.
+#[derive(Debug, thiserror::Error)]
+#[error("the coordinator had to stop, since its store can be used no more: {0}")]
+pub struct StoreBroken(String);
+
 /// A coordinator that runs. Dropping it without [`Running::shutdown`] leaves it running
 /// as long as the runtime does.
 #[derive(Debug)]
@@ -76,15 +84,16 @@ pub struct Running {
     epoch: Epoch,
     token: Token,
     inputs: mpsc::Sender<Input>,
+    news: mpsc::Sender<News>,
     stop: oneshot::Sender<()>,
-    shell: JoinHandle<()>,
+    shell: JoinHandle<Result<(), String>>,
     server: JoinHandle<Result<(), tonic::transport::Error>>,
 }
 
 /// Starts a coordinator over a state folder.
 ///
 /// Answers once it listens; from then on it runs on the runtime that this is called on, until
-/// [`Running::shutdown`].
+/// [`Running::run_until`] stops it.
 pub async fn start(config: Config) -> Result<Running, StartError> {
     if !config.listen.ip().is_loopback() {
         return Err(StartError::NotLoopback(config.listen));
@@ -101,11 +110,13 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     state.announce(address)?;
 
     let (inputs, taken) = mpsc::channel(config.limits.inputs_max);
-    let storage = Storage::start(inputs.clone(), store, open).map_err(StartError::Thread)?;
+    let (news, heard) = mpsc::channel(NEWS_MAX);
+    let storage =
+        Storage::start(news.clone(), Box::new(store), open).map_err(StartError::Thread)?;
     let jobs = kept.len();
     let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
     shell.recall(kept);
-    let shell = tokio::spawn(shell.run(taken));
+    let shell = tokio::spawn(shell.run(heard, taken));
     let door = Arc::new(Door::new(inputs.clone(), config, &state));
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();
@@ -123,6 +134,7 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
         epoch: state.epoch(),
         token,
         inputs,
+        news,
         stop,
         shell,
         server,
@@ -154,13 +166,23 @@ impl Running {
         &self.token
     }
 
-    /// Stops it: workers and watchers are told; jobs go on at the next start. Answers when everything has ended.
-    pub async fn shutdown(self) {
-        // An error says that the loop has ended already.
-        let _ = self.inputs.send(Input::Stop).await;
-        if self.shell.await.is_err() {
+    /// Lets it run until `asked` says to stop it, or until it must stop; then stops it: workers and watchers are
+    /// told; jobs go on at the next start. Answers when everything has ended.
+    ///
+    /// An error says that its store can be used no more.
+    pub async fn run_until(mut self, asked: impl Future<Output = ()>) -> Result<(), StoreBroken> {
+        let ended = tokio::select! {
+            () = asked => {
+                // An error says that the loop has ended already.
+                let _ = self.news.send(News::Stop).await;
+                (&mut self.shell).await
+            }
+            ended = &mut self.shell => ended,
+        };
+        let result = ended.unwrap_or_else(|_| {
             tracing::error!("the coordinator's loop died of a mistake in this program");
-        }
+            Ok(())
+        });
         drop(self.stop);
         drop(self.inputs);
         let mut server = self.server;
@@ -171,5 +193,11 @@ impl Running {
             server.abort();
         }
         tracing::info!("the coordinator has stopped");
+        result.map_err(StoreBroken)
+    }
+
+    /// Stops it now.
+    pub async fn shutdown(self) -> Result<(), StoreBroken> {
+        self.run_until(std::future::ready(())).await
     }
 }

@@ -195,7 +195,7 @@ impl State {
 }
 
 impl JobFolders {
-    fn at(root: PathBuf) -> Self {
+    pub(crate) fn at(root: PathBuf) -> Self {
         Self {
             frames: root.join("frames"),
             scratch: root.join("scratch"),

@@ -121,11 +121,9 @@ impl Scratch {
         identity: ScratchIdentity,
         window: Rect,
     ) -> Result<Self, ImageError> {
-        let path = path.into();
-        let (file, _) = open(&path, &identity, window)?;
-        let grid = Grid::new(window);
-        write_header(&file, &path, &identity.header(window), grid)?;
-        Ok(Self::assemble(path, file, identity, grid, None))
+        // Nothing was noted, so whatever an earlier one held counts for nothing.
+        let (scratch, _) = Self::reopen_bare(path, identity, window, [])?;
+        Ok(scratch)
     }
 
     /// Goes on with a scratch file that was begun by [`Scratch::create_bare`], of which these blocks, with
@@ -242,8 +240,7 @@ impl Scratch {
         if self.state().coverage.contains(block) {
             return Ok(());
         }
-        self.write_slot(block, payload)
-            .map_err(|source| ImageError::io("write a block to", &self.path, source))?;
+        self.write_again(block, payload)?;
         let mut state = self.state();
         if let Some(journal) = &mut state.journal {
             let digest = payload_digest(payload);
@@ -251,6 +248,15 @@ impl Scratch {
         }
         state.coverage.add(block);
         Ok(())
+    }
+
+    /// Writes a block at its place that [`Scratch::write_block`] has taken.
+    ///
+    /// What was written since the last sync may be gone after one that failed, and the next one does not
+    /// say so: the system counts it as written. Whoever goes on must write it again.
+    pub fn write_again(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
+        self.write_slot(block, payload)
+            .map_err(|source| ImageError::io("write a block to", &self.path, source))
     }
 
     fn check(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
@@ -295,7 +301,7 @@ impl Scratch {
     }
 
     /// Makes every block written so far durable: pixels, journal, and the files' names. Blocks may
-    /// be written meanwhile.
+    /// be written meanwhile. After an error see [`Scratch::write_again`].
     pub fn sync(&self) -> Result<(), ImageError> {
         let journal = self.state().journal.as_ref().map(Journal::file);
         self.file

@@ -9,12 +9,13 @@ use store::Entry;
 
 use super::Shell;
 use crate::about::{FileAbout, ImageAbout};
+use crate::clock::unix_ms;
 use crate::storage::{Era, Ticket};
 
+/// Most effects that wait, but for those of one more input.
+const HELD_MAX: usize = 16_384;
+
 /// Effects, and the records that they wait for, in order.
-///
-/// Bounded by what may happen while the disk is busy with one group: blocks by their permits, workers and users by
-/// what they may have under way.
 #[derive(Debug, Default)]
 pub(super) struct Held {
     queue: VecDeque<Waiting>,
@@ -30,6 +31,13 @@ enum Waiting {
     Encode(ImageRef, Era),
     /// What follows waits for this record.
     Until(Ticket),
+}
+
+impl Held {
+    /// Whether so much waits that nobody may add to it.
+    pub(super) fn is_full(&self) -> bool {
+        self.queue.len() >= HELD_MAX
+    }
 }
 
 impl Shell {
@@ -50,7 +58,8 @@ impl Shell {
                 self.end_era(*image);
             }
         }
-        if let Some(entry) = told.and_then(|event| self.entry(event, files, &effects)) {
+        if let Some(entry) = told.and_then(|event| self.entry(unix_ms(now), event, files, &effects))
+        {
             self.held.records += 1;
             let ticket = self.held.records;
             let placed = match &entry {
@@ -111,9 +120,14 @@ impl Shell {
         *self.eras.entry(image).or_default() += 1;
     }
 
-    /// What is to be committed of an event, if it changed anything.
-    fn entry(&mut self, event: Event, files: &[FinishedFile], effects: &[Effect]) -> Option<Entry> {
-        let unix_ms = self.unix_ms_now();
+    /// What is to be committed of an event that the scheduler was told at a time, if it changed anything.
+    fn entry(
+        &mut self,
+        unix_ms: u64,
+        event: Event,
+        files: &[FinishedFile],
+        effects: &[Effect],
+    ) -> Option<Entry> {
         match event {
             Event::Submit(submission) => self.begin_job(unix_ms, submission),
             Event::Command { job, command } => {

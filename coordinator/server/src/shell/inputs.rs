@@ -9,14 +9,31 @@ use wire::{Failure, convert};
 
 use super::{Commanding, Next, Shell, Submitting};
 use crate::inbox::NewJob;
-use crate::input::{Arrived, Greeting, Input, Link, Reply};
+use crate::input::{Arrived, Greeting, Input, Link, News, Reply};
 use crate::job::Sign;
-use crate::storage::{Encoded, Stored};
+use crate::storage::{Encoded, Hand, Stored};
 use crate::worker::Worker;
 
 impl Shell {
+    /// Hears what the coordinator itself has to say.
+    pub(super) fn hear(&mut self, news: News) -> Next {
+        match news {
+            News::Stored(group) => {
+                for stored in group {
+                    self.stored(stored);
+                }
+            }
+            News::Committed(ticket) => self.committed(ticket),
+            News::Encoded(encoded) => self.encoded(encoded),
+            News::Trouble(hand, trouble) => self.disk_says(hand, trouble),
+            News::Broken(sentence) => return Next::Stop(Err(sentence)),
+            News::Stop => return Next::Stop(Ok(())),
+        }
+        Next::GoOn
+    }
+
     /// Takes one input.
-    pub(super) fn take(&mut self, input: Input) -> Next {
+    pub(super) fn take(&mut self, input: Input) {
         match input {
             Input::Submit(new, reply) => self.submit(new, reply),
             Input::Command(job, command, reply) => self.command(job, command, reply),
@@ -43,23 +60,7 @@ impl Shell {
                     worker.delivery = None;
                 }
             }
-            Input::Stored(group) => {
-                for stored in group {
-                    self.stored(stored);
-                }
-            }
-            Input::Committed(ticket) => self.committed(ticket),
-            Input::Encoded(encoded) => self.encoded(encoded),
-            Input::Trouble(trouble) => self.disk_says(trouble),
-            Input::Broken(sentence) => {
-                tracing::error!(
-                    "the coordinator stops, since its store can be used no more: {sentence}"
-                );
-                return Next::Stop;
-            }
-            Input::Stop => return Next::Stop,
         }
-        Next::GoOn
     }
 
     fn submit(&mut self, new: Box<NewJob>, reply: Reply<proto::Submitted>) {
@@ -162,21 +163,26 @@ impl Shell {
         self.feed(Event::Command { job, command });
     }
 
-    /// The disk waits to be tried again, or is well again. While it waits nobody is late.
-    fn disk_says(&mut self, trouble: Option<String>) {
+    /// A thread of the disk waits, or waits no more. While the writer waits nobody is late.
+    fn disk_says(&mut self, hand: Hand, trouble: Option<String>) {
         let said = match &trouble {
             Some(sentence) => {
-                tracing::error!("the disk is in trouble, everything waits for it: {sentence}");
-                self.clock.hold();
+                tracing::error!(?hand, "the coordinator waits for its disk: {sentence}");
                 format!("the coordinator waits for its disk: {sentence}")
             }
             None => {
-                tracing::info!("the disk is well again");
-                self.clock.release();
+                tracing::info!(?hand, "the disk is well again");
                 "the coordinator's disk is well again".to_owned()
             }
         };
-        self.trouble = trouble;
+        match trouble {
+            Some(sentence) => self.troubles.insert(hand, sentence),
+            None => self.troubles.remove(&hand),
+        };
+        match self.troubles.contains_key(&Hand::Writer) {
+            true => self.clock.hold(),
+            false => self.clock.release(),
+        }
         let running: Vec<_> = self
             .sched
             .jobs()

@@ -28,10 +28,10 @@ use wire::proto;
 use crate::clock::Clock;
 use crate::config::Config;
 use crate::inbox::NewJob;
-use crate::input::{Input, Reply};
+use crate::input::{Input, News, Reply};
 use crate::job::Jobs;
 use crate::state::State;
-use crate::storage::{Era, Storage};
+use crate::storage::{Era, Hand, Storage};
 use crate::worker::Workers;
 
 use self::hold::Held;
@@ -66,8 +66,8 @@ pub(crate) struct Shell {
     held: Held,
     /// Eras of images that are not in their first.
     eras: BTreeMap<ImageRef, Era>,
-    /// What the disk waits for, while it does.
-    trouble: Option<String>,
+    /// What the disk waits for, by who waits.
+    troubles: BTreeMap<Hand, String>,
 }
 
 /// A submission on its way.
@@ -90,10 +90,11 @@ struct Commanding {
 }
 
 /// Whether the loop goes on.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(PartialEq, Eq)]
 enum Next {
     GoOn,
-    Stop,
+    /// As it was asked to, or because it must.
+    Stop(Result<(), String>),
 }
 
 impl Shell {
@@ -125,15 +126,19 @@ impl Shell {
             commanding: VecDeque::new(),
             held: Held::default(),
             eras: BTreeMap::new(),
-            trouble: None,
+            troubles: BTreeMap::new(),
         }
     }
 
-    /// Runs until [`Input::Stop`]; then cleans up and answers.
-    pub(crate) async fn run(mut self, mut inputs: mpsc::Receiver<Input>) {
+    /// Runs until [`News::Stop`]; then cleans up and answers. An error is why it had to end.
+    pub(crate) async fn run(
+        mut self,
+        mut news: mpsc::Receiver<News>,
+        mut inputs: mpsc::Receiver<Input>,
+    ) -> Result<(), String> {
         let mut watch_at: Option<Instant> = None;
         let mut since_tick = 0;
-        loop {
+        let ended = loop {
             let deadline = self.sched.next_deadline();
             let tick_at = deadline
                 .filter(|_| !self.clock.is_held())
@@ -146,15 +151,18 @@ impl Shell {
                     watch_at = None;
                     self.tell_watchers();
                 }
-                input = inputs.recv(), if !tick_is_overdue => {
+                news = news.recv() => {
+                    let next = news.map(|news| self.hear(news));
+                    if let Next::Stop(ended) = next.unwrap_or(Next::Stop(Ok(()))) {
+                        break ended;
+                    }
+                }
+                // Where much waits for the disk, whoever would add to it waits too.
+                input = inputs.recv(), if !tick_is_overdue && !self.is_full() => {
                     since_tick += 1;
                     match input {
-                        Some(input) => {
-                            if self.take(input) == Next::Stop {
-                                break;
-                            }
-                        }
-                        None => break,
+                        Some(input) => self.take(input),
+                        None => break Ok(()),
                     }
                 }
                 () = wait_until(tick_at) => {
@@ -165,9 +173,14 @@ impl Shell {
             if watch_at.is_none() && self.jobs.has_dirty() {
                 watch_at = Some(Instant::now() + WATCH_INTERVAL);
             }
-        }
-        drop(inputs);
+        };
+        drop((news, inputs));
         self.end().await;
+        ended
+    }
+
+    fn is_full(&self) -> bool {
+        self.held.is_full() || self.storage.is_full()
     }
 
     fn now(&self) -> Timestamp {

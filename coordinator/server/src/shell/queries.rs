@@ -75,7 +75,7 @@ impl Shell {
             }
         };
         // Nothing else matters while nothing can be kept.
-        let sentence = match &self.trouble {
+        let sentence = match self.troubles.values().next() {
             Some(trouble) => format!("the coordinator waits for its disk: {trouble}"),
             None => sentence,
         };

@@ -130,6 +130,12 @@ impl Shell {
         for effect in effects.into_iter().filter(still_wanted) {
             self.perform(effect);
         }
+        for (id, job) in self.jobs.iter_mut() {
+            let state = self.sched.job(id).map(|view| view.state);
+            if state != Some(sched::JobState::Running) {
+                job.dismiss_watchers();
+            }
+        }
         let running: Vec<_> = self
             .sched
             .jobs()

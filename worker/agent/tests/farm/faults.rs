@@ -86,7 +86,7 @@ async fn a_worker_finds_the_next_coordinator() {
     let done = farm.job_over(job).await;
     assert_eq!(done.images[0].film_digest, film_digest(&scene, 3).0);
     worker.leave(Ask::Stop).await;
-    next.shutdown().await;
+    next.shutdown().await.unwrap();
 }
 
 #[tokio::test]

@@ -80,7 +80,9 @@ impl Farm {
 
     pub(crate) async fn stop(&mut self) {
         let running = self.running.take().expect("it runs");
-        soon("the coordinator has stopped", running.shutdown()).await;
+        soon("the coordinator has stopped", running.shutdown())
+            .await
+            .unwrap();
     }
 
     pub(crate) async fn client(&self) -> wire::link::Farm {
