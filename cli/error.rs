@@ -52,7 +52,9 @@ impl Ending {
     const fn meaning(self) -> &'static str {
         match self {
             Self::Done => "everything asked for was done",
-            Self::Failed => "the work failed: a file, a frame or a disk",
+            Self::Failed => {
+                "the work failed: a file, a frame or a disk; `farm doctor`: something is wrong"
+            }
             Self::Usage => "a wrong option or configuration, or a scene with mistakes",
             Self::Unreachable => "no coordinator answered, or it refused",
             Self::Different => {

@@ -94,6 +94,53 @@ pub(crate) enum Existing {
     Fail,
 }
 
+/// The job's place among others.
+#[derive(Args, Clone, Debug)]
+pub(crate) struct PlaceOptions {
+    /// Serve it before jobs of lower priority; it may be negative.
+    #[arg(
+        long,
+        value_name = "N",
+        default_value_t = 0,
+        allow_negative_numbers = true,
+        help_heading = "Farm"
+    )]
+    pub(crate) priority: i32,
+
+    /// Its part of the farm against the other jobs of its priority, 1 to 1000.
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000), help_heading = "Farm")]
+    pub(crate) share: u32,
+
+    /// Begin when this job is finished; may be repeated.
+    #[arg(long, value_name = "JOB", help_heading = "Farm")]
+    pub(crate) after: Vec<u64>,
+
+    /// Only workers with this label may render it; may be repeated.
+    #[arg(long, value_name = "LABEL", value_parser = values::label, help_heading = "Farm")]
+    pub(crate) need_label: Vec<String>,
+
+    /// Only workers of at least so many render threads.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=4096), help_heading = "Farm")]
+    pub(crate) need_threads: Option<u32>,
+
+    /// Only workers whose machine has so much memory, such as 16 GiB.
+    #[arg(long, value_name = "SIZE", value_parser = values::memory, help_heading = "Farm")]
+    pub(crate) need_memory: Option<u64>,
+}
+
+impl Default for PlaceOptions {
+    fn default() -> Self {
+        Self {
+            priority: 0,
+            share: 1,
+            after: Vec::new(),
+            need_label: Vec::new(),
+            need_threads: None,
+            need_memory: None,
+        }
+    }
+}
+
 /// Which coordinator to talk to.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct FarmOptions {

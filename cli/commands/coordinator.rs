@@ -1,6 +1,8 @@
 //! `flyby coordinator`: runs a coordinator until it is told to stop.
 
 use std::net::{Ipv4Addr, SocketAddr};
+use std::os::unix::fs::PermissionsExt as _;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use model::Span;
@@ -22,6 +24,12 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "TIME", default_value = "4 s", value_parser = values::span)]
     liveness: Span,
 
+    /// A program to run whenever a job is over; its environment names the job: FLYBY_JOB, FLYBY_JOB_NAME,
+    /// FLYBY_JOB_STATE (done, failed or cancelled), FLYBY_JOB_FRAMES, FLYBY_JOB_FRAMES_DONE, FLYBY_JOB_FRAMES_FAILED and
+    /// FLYBY_JOB_FOLDER, where its frames are.
+    #[arg(long, value_name = "PROGRAM")]
+    on_job_end: Option<PathBuf>,
+
     #[command(flatten)]
     daemon: DaemonOptions,
 }
@@ -34,6 +42,7 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         liveness_limit: options.liveness,
         // Four heartbeats may be missed, and one a second is enough.
         heartbeat_interval: Span((options.liveness.0 / 4).clamp(1_000, 1_000_000)),
+        on_job_end: options.on_job_end.as_deref().map(program).transpose()?,
         ..usual
     };
     let state = config.state.clone();
@@ -48,6 +57,21 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         ended.map_err(|broken| Error::failed("the coordinator had to stop").because(broken))?;
         Ok(Ending::Done)
     })
+}
+
+/// The hook's program, which must be there now and not only when the first job is over.
+fn program(path: &Path) -> Result<PathBuf, Error> {
+    let attempt = || format!("cannot use `{}` for --on-job-end", path.display());
+    let found = path.canonicalize();
+    let found = found.map_err(|error| Error::usage(attempt()).because(error))?;
+    let metadata = std::fs::metadata(&found);
+    let metadata = metadata.map_err(|error| Error::usage(attempt()).because(error))?;
+    if !metadata.is_file() || metadata.permissions().mode() & 0o111 == 0 {
+        return Err(Error::usage(attempt())
+            .because("it is not a program")
+            .next("`chmod +x` it, if it is a script"));
+    }
+    Ok(found)
 }
 
 fn revision() -> model::Revision {

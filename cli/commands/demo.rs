@@ -15,7 +15,7 @@ use crate::farm::local::{LocalFarm, Troubles};
 use crate::farm::submit::Submission;
 use crate::farm::view::Job;
 use crate::load::{self, Scene};
-use crate::options::{Context, Existing};
+use crate::options::{Context, Existing, PlaceOptions};
 use crate::output::{self, Report, say};
 use crate::stop::Stop;
 
@@ -66,6 +66,7 @@ pub(crate) fn run(context: &Context, options: &Demo) -> Result<Ending, Error> {
             frames,
             tile: None,
             min_tile_pixels: None,
+            place: PlaceOptions::default(),
             formats: Formats::new([image::Format::Exr, image::Format::Png8]),
             settings_json: serde_json::json!({ "scene": "demo.toml" }).to_string(),
         },

@@ -4,13 +4,14 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use model::JobId;
+use model::{JobId, Rect};
 use serde::Serialize;
 use tokio::sync::mpsc;
 use wire::proto::job_command::Command as Wanted;
 use wire::proto::job_update::Update;
 use wire::proto::{
     self, ImageState, ImageStatus, JobRequest, JobSummary, ListJobsRequest, Pause, Remove, Resume,
+    Retry,
 };
 
 use crate::error::{Ending, Error};
@@ -22,6 +23,7 @@ use crate::farm::view::{self, Image, Job, Jobs, Whole};
 use crate::options::{Context, Existing, FarmOptions};
 use crate::output::{self, Report, say};
 use crate::stop::Stop;
+use crate::values;
 
 #[derive(Subcommand, Debug)]
 pub(crate) enum JobCommand {
@@ -35,16 +37,24 @@ pub(crate) enum JobCommand {
     Log(Named),
     /// Ends a job; finished frames stay.
     Cancel(Named),
-    /// Says why a job, or one of its frames, is not finished.
+    /// Says why a job, one of its frames or one of its pixels is not finished.
     Why(Why),
     /// Begins nothing more of a job; what is being rendered is finished.
     Pause(Named),
     /// Goes on with a job that was paused.
     Resume(Named),
+    /// Renders the failed frames of a job again.
+    Retry(Named),
+    /// Renders one frame of a job again, finished or failed.
+    Again(Again),
     /// Serves a job before those of lower priority; jobs begin with 0.
     Priority(Priority),
-    /// Forgets a job, ending it first; finished frames stay on the coordinator's disk.
-    Remove(Named),
+    /// Changes a job's part of the farm against the other jobs of its priority; jobs begin with 1.
+    Share(Share),
+    /// Renders a part of each frame before the rest.
+    Focus(Focus),
+    /// Forgets a job, ending it first; finished frames stay on the coordinator's disk unless told otherwise.
+    Remove(RemoveJob),
     /// Fetches the finished frames of a job.
     Fetch(Fetch),
 }
@@ -57,6 +67,53 @@ pub(crate) struct Why {
     /// One of its frames.
     #[arg(long, value_name = "N")]
     frame: Option<u32>,
+
+    /// A pixel of that frame, column and row.
+    #[arg(long, value_name = "X,Y", requires = "frame", value_parser = values::pixel)]
+    pixel: Option<(u32, u32)>,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Again {
+    #[command(flatten)]
+    named: Named,
+
+    /// Number of the frame.
+    frame: u32,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Share {
+    #[command(flatten)]
+    named: Named,
+
+    /// The share, 1 to 1000: a job of share 2 holds twice as many tiles at a time as one of share 1.
+    #[arg(value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    share: u32,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Focus {
+    #[command(flatten)]
+    named: Named,
+
+    /// The part that comes first: x0,y0,x1,y1 (ends not included) or WxH+X+Y.
+    #[arg(value_name = "RECT", value_parser = values::crop, required_unless_present = "none")]
+    region: Option<Rect>,
+
+    /// No part comes first any more.
+    #[arg(long, conflicts_with = "region")]
+    none: bool,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct RemoveJob {
+    #[command(flatten)]
+    named: Named,
+
+    /// Its finished frames on the coordinator's disk go too.
+    #[arg(long)]
+    frames: bool,
 }
 
 #[derive(Args, Debug)]
@@ -134,9 +191,30 @@ pub(crate) fn run(context: &Context, command: JobCommand) -> Result<Ending, Erro
             let attempt = "change the priority of";
             block_on(want(context, &options.named, attempt, wanted))
         }
-        JobCommand::Remove(named) => {
-            let wanted = Wanted::Remove(Remove {});
-            block_on(want(context, &named, "remove", wanted))
+        JobCommand::Retry(named) => {
+            let wanted = Wanted::Retry(Retry {});
+            block_on(want(context, &named, "retry", wanted))
+        }
+        JobCommand::Again(options) => {
+            let image = options.frame;
+            let wanted = Wanted::Again(proto::Again { image });
+            let attempt = format!("render frame {image} again in");
+            block_on(want(context, &options.named, &attempt, wanted))
+        }
+        JobCommand::Share(options) => {
+            let share = options.share;
+            let wanted = Wanted::Share(proto::Share { share });
+            block_on(want(context, &options.named, "change the share of", wanted))
+        }
+        JobCommand::Focus(options) => {
+            let region = options.region.map(Into::into);
+            let wanted = Wanted::Focus(proto::Focus { region });
+            block_on(want(context, &options.named, "change the focus of", wanted))
+        }
+        JobCommand::Remove(options) => {
+            let frames = options.frames;
+            let wanted = Wanted::Remove(Remove { frames });
+            block_on(want(context, &options.named, "remove", wanted))
         }
         JobCommand::Fetch(options) => block_on(fetch(context, &options)),
     }
@@ -334,6 +412,8 @@ struct Reason {
     job: u64,
     /// The frame asked for; null is the job as a whole.
     frame: Option<u32>,
+    /// The pixel asked for, column and row; null is the frame as a whole.
+    pixel: Option<(u32, u32)>,
     /// Why it is not finished, a sentence.
     why: String,
 }
@@ -355,12 +435,15 @@ async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
         .why(proto::WhyRequest {
             job,
             image: options.frame,
+            pixel: options.pixel.map(|(x, y)| proto::Pixel { x, y }),
+            worker: None,
         })
         .await
         .map_err(|status| refused(format!("cannot say why job {job} waits"), status))?;
     let reason = Reason {
         job,
         frame: options.frame,
+        pixel: options.pixel,
         why: answer.into_inner().sentence,
     };
     output::print(context.output, &reason)?;

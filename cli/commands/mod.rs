@@ -4,6 +4,7 @@ mod bench;
 mod completions;
 mod coordinator;
 mod demo;
+mod farm;
 mod gallery;
 mod image;
 mod job;
@@ -68,9 +69,12 @@ enum Command {
     Worker(worker::WorkerCommand),
     /// Submits a job to the coordinator.
     Submit(submit::Submit),
-    /// Your jobs: list, show, watch, log, cancel, fetch.
+    /// Your jobs: how they stand, their frames, their place among others.
     #[command(subcommand)]
     Job(job::JobCommand),
+    /// The farm: how it stands, what is wrong with it, what can be cleaned away.
+    #[command(subcommand)]
+    Farm(farm::FarmCommand),
     /// Scene files: mistakes, contents, schema.
     #[command(subcommand)]
     Scene(scene::SceneCommand),
@@ -104,6 +108,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Worker(command) => worker::run(&context, command),
         Command::Submit(options) => submit::run(&context, &options),
         Command::Job(command) => job::run(&context, command),
+        Command::Farm(command) => farm::run(&context, command),
         Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),
         Command::Noise(command) => noise::run(&context, command),

@@ -6,7 +6,8 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use image::{Format, frame_name};
-use model::{FrameRange, ImageNumber, Resolution};
+use indicatif::HumanBytes;
+use model::{FrameRange, ImageNumber, JobId, Resolution};
 use serde::Serialize;
 
 use super::job::{make_folder, until_over};
@@ -18,7 +19,9 @@ use crate::farm::follow::ending;
 use crate::farm::link::block_on;
 use crate::farm::submit::Submission;
 use crate::farm::view::{Job, Whole};
-use crate::options::{Context, Existing, FarmOptions, FileOptions, FrameOptions, SceneOptions};
+use crate::options::{
+    Context, Existing, FarmOptions, FileOptions, FrameOptions, PlaceOptions, SceneOptions,
+};
 use crate::output::{self, Report, say};
 use crate::stop::Stop;
 use crate::values;
@@ -60,6 +63,9 @@ pub(crate) struct Submit {
     pub(crate) min_tile_pixels: Option<NonZeroU64>,
 
     #[command(flatten)]
+    pub(crate) place: PlaceOptions,
+
+    #[command(flatten)]
     pub(crate) farm: FarmOptions,
 }
 
@@ -74,6 +80,10 @@ pub(crate) struct SubmitReport {
     frames: String,
     /// Digest of the scene with all its settings.
     scene_digest: String,
+    /// Bytes that it may need on the coordinator's disk, if nothing of its frames could be compressed.
+    disk_needed_bytes: u64,
+    /// Bytes that are free there; null where that is not known.
+    disk_free_bytes: Option<u64>,
     /// The job at its end, where it was followed.
     pub(crate) result: Option<Job>,
     /// Where the frames are, where they were fetched.
@@ -104,6 +114,7 @@ pub(crate) fn run(context: &Context, options: &Submit) -> Result<Ending, Error> 
             frames,
             tile: options.tile,
             min_tile_pixels: options.min_tile_pixels,
+            place: options.place.clone(),
             formats: options.files.formats(),
             settings_json: options.scene.settings_json(),
         },
@@ -200,16 +211,30 @@ impl Order<'_> {
         stop: &Stop,
         report: &mut SubmitReport,
     ) -> Result<(), Error> {
-        let job = block_on(async {
+        let submitted = block_on(async {
             tokio::select! {
                 () = stop.wait() => Err(Error::interrupted("interrupted while submitting")
                     .next("`flyby job list` says whether the job was taken")),
-                job = self.submission.hand_in(context, farm) => job,
+                submitted = self.submission.hand_in(context, farm) => submitted,
             }
         })?;
+        let job = JobId(submitted.job);
         let (name, frames) = (self.submission.name, self.submission.frames);
-        say(format_args!("job {job}: {name}, frames {frames}"));
+        let needed = submitted.disk_needed_bytes;
+        say(format_args!(
+            "job {job}: {name}, frames {frames}; at most {} on the coordinator's disk",
+            HumanBytes(needed)
+        ));
+        if let Some(free) = submitted.disk_free_bytes.filter(|&free| free < needed) {
+            say(format_args!(
+                "only {} are free there: frames are usually smaller than that, and the farm waits where the disk \
+                 is full until there is room",
+                HumanBytes(free)
+            ));
+        }
         report.job = Some(job.0);
+        report.disk_needed_bytes = needed;
+        report.disk_free_bytes = submitted.disk_free_bytes;
         if self.watch || self.target.is_some() {
             let target = self.target.map(|target| (target.folder, target.existing));
             let (whole, fetched) = block_on(until_over(context, farm, job, stop, target))?;
@@ -267,6 +292,8 @@ impl SubmitReport {
             name: order.submission.name.to_owned(),
             frames: order.submission.frames.to_string(),
             scene_digest: order.submission.scene.digest.to_string(),
+            disk_needed_bytes: 0,
+            disk_free_bytes: None,
             result: None,
             folder: order.target.map(|target| target.folder.to_owned()),
             fetched: Vec::new(),

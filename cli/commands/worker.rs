@@ -1,15 +1,18 @@
 //! `flyby worker`: runs a worker until it is told to stop; with a verb, manages workers.
 
 use std::fs::{self, File};
+use std::io::{self, Write};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use agent::{Ask, ExitReason, RenderPainter, RunError};
 use clap::{Args, Subcommand};
+use model::Span;
 use render::SimdLevel;
+use serde::Serialize;
 use tokio::sync::mpsc;
-use wire::proto::ListWorkersRequest;
+use wire::proto::{self, ListWorkersRequest, WorkerList};
 
 use super::render::processors;
 use crate::daemon::{self, DaemonOptions};
@@ -17,7 +20,7 @@ use crate::error::{Ending, Error};
 use crate::farm::link::{block_on, refused};
 use crate::farm::view::{self, Workers};
 use crate::options::{Context, FarmOptions};
-use crate::output;
+use crate::output::{self, Report};
 use crate::stop::Stop;
 use crate::values;
 
@@ -35,6 +38,33 @@ pub(crate) struct WorkerCommand {
 enum Verb {
     /// Lists the workers that the coordinator knows.
     List(List),
+    /// Says why a worker has not more to do.
+    Why(Why),
+    /// Has workers finish what they hold and leave.
+    Drain(Drain),
+}
+
+#[derive(Args, Debug)]
+struct Why {
+    /// Its name or number.
+    #[arg(value_name = "WORKER")]
+    named: String,
+    #[command(flatten)]
+    farm: FarmOptions,
+}
+
+#[derive(Args, Debug)]
+struct Drain {
+    /// Their names or numbers.
+    #[arg(value_name = "WORKER", required_unless_present = "all")]
+    named: Vec<String>,
+
+    /// Every worker.
+    #[arg(long, conflicts_with = "named")]
+    all: bool,
+
+    #[command(flatten)]
+    farm: FarmOptions,
 }
 
 #[derive(Args, Debug)]
@@ -65,6 +95,14 @@ struct Worker {
     #[arg(long, value_name = "LEVEL")]
     simd: Option<SimdLevel>,
 
+    /// A label that jobs may ask for; may be repeated.
+    #[arg(long, value_name = "LABEL", value_parser = values::label)]
+    label: Vec<String>,
+
+    /// How long it may run, such as 12 h: it takes no tile that would not be finished by then, and leaves in time.
+    #[arg(long, value_name = "TIME", value_parser = values::span)]
+    time_limit: Option<Span>,
+
     #[command(flatten)]
     daemon: DaemonOptions,
 }
@@ -74,7 +112,64 @@ pub(crate) fn run(context: &Context, command: WorkerCommand) -> Result<Ending, E
     match command.verb {
         None => work(context, &command.worker),
         Some(Verb::List(options)) => block_on(list(context, &options.farm)),
+        Some(Verb::Why(options)) => block_on(why(context, &options)),
+        Some(Verb::Drain(options)) => block_on(drain(context, options)),
     }
+}
+
+/// `worker why`.
+#[derive(Serialize)]
+struct Reason {
+    /// The worker, as it was asked for.
+    worker: String,
+    /// Why it has not more to do, a sentence.
+    why: String,
+}
+
+impl Report for Reason {
+    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.why)
+    }
+
+    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.table(out)
+    }
+}
+
+async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
+    let mut farm = context.connect(&options.farm).await?;
+    let answer = farm
+        .why(proto::WhyRequest {
+            worker: Some(options.named.clone()),
+            ..proto::WhyRequest::default()
+        })
+        .await
+        .map_err(|status| refused("cannot say why the worker waits", status))?;
+    let reason = Reason {
+        worker: options.named.clone(),
+        why: answer.into_inner().sentence,
+    };
+    output::print(context.output, &reason)?;
+    Ok(Ending::Done)
+}
+
+async fn drain(context: &Context, options: Drain) -> Result<Ending, Error> {
+    let mut farm = context.connect(&options.farm).await?;
+    let answer = farm
+        .drain_workers(proto::DrainRequest {
+            workers: options.named,
+            all: options.all,
+        })
+        .await
+        .map_err(|status| refused("cannot drain the workers", status))?;
+    print(context, answer.into_inner())
+}
+
+fn print(context: &Context, workers: WorkerList) -> Result<Ending, Error> {
+    let workers = workers.workers.into_iter().map(view::Worker::from);
+    let workers = workers.collect();
+    output::print(context.output, &Workers { workers })?;
+    Ok(Ending::Done)
 }
 
 async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error> {
@@ -83,10 +178,7 @@ async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error>
         .list_workers(ListWorkersRequest {})
         .await
         .map_err(|status| refused("cannot list the workers", status))?;
-    let workers = answer.into_inner().workers.into_iter();
-    let workers = workers.map(view::Worker::from).collect();
-    output::print(context.output, &Workers { workers })?;
-    Ok(Ending::Done)
+    print(context, answer.into_inner())
 }
 
 fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
@@ -104,6 +196,8 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         state: home.as_ref().map(|home| home.folder.clone()),
         build: daemon::software(),
         memory_bytes: memory_bytes(),
+        labels: options.label.clone(),
+        time_limit: options.time_limit,
         ..agent::Config::new(coordinator, token, name, threads.unwrap_or(NonZeroU32::MIN))
     };
     let painter = RenderPainter::new(options.simd.unwrap_or_else(SimdLevel::best));

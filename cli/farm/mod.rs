@@ -1,6 +1,7 @@
 //! What commands do with a coordinator: reach it, start one, follow a job, fetch its
 //! frames, show what it says.
 
+pub(crate) mod doctor;
 pub(crate) mod fetch;
 pub(crate) mod follow;
 pub(crate) mod link;

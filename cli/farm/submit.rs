@@ -3,17 +3,17 @@
 use std::num::NonZeroU64;
 
 use image::Formats;
-use model::{Digest, FrameRange, JobId, Resolution, SubmissionId};
+use model::{Digest, FrameRange, Resolution, SubmissionId};
 use tokio_stream::iter;
 use wire::link::CHUNK_BYTES;
 use wire::proto::submit_part::Part;
-use wire::proto::{AssetPart, SubmitHead, SubmitPart, TileShape};
+use wire::proto::{AssetPart, Needs, SubmitHead, SubmitPart, Submitted, TileShape};
 
 use super::link::refused;
 use super::view::wire_format;
 use crate::error::Error;
 use crate::load::Scene;
-use crate::options::{Context, FarmOptions};
+use crate::options::{Context, FarmOptions, PlaceOptions};
 
 /// A job to hand in.
 pub(crate) struct Submission<'a> {
@@ -29,17 +29,19 @@ pub(crate) struct Submission<'a> {
     pub(crate) min_tile_pixels: Option<NonZeroU64>,
     /// Which files each frame becomes.
     pub(crate) formats: Formats,
+    /// Its place among other jobs.
+    pub(crate) place: PlaceOptions,
     /// What the user said about the scene, JSON.
     pub(crate) settings_json: String,
 }
 
 impl Submission<'_> {
-    /// Submits it; answers the job's number.
+    /// Submits it; answers the job's number, and what it may need of the coordinator's disk.
     pub(crate) async fn hand_in(
         &self,
         context: &Context,
         farm: &FarmOptions,
-    ) -> Result<JobId, Error> {
+    ) -> Result<Submitted, Error> {
         let mut id = [0; 16];
         getrandom::fill(&mut id).map_err(|error| {
             Error::failed("cannot draw a number for the job").because(error.to_string())
@@ -50,7 +52,7 @@ impl Submission<'_> {
             .submit(iter(parts))
             .await
             .map_err(|status| refused("cannot submit the job", status))?;
-        Ok(JobId(answer.into_inner().job))
+        Ok(answer.into_inner())
     }
 
     /// The submission's messages, in the order that the protocol wants.
@@ -72,6 +74,14 @@ impl Submission<'_> {
                 .collect(),
             settings_json: self.settings_json.clone(),
             min_tile_pixels: self.min_tile_pixels.map_or(0, NonZeroU64::get),
+            priority: self.place.priority,
+            share: self.place.share,
+            needs: Some(Needs {
+                labels: self.place.need_label.clone(),
+                threads: self.place.need_threads.unwrap_or(0),
+                memory_bytes: self.place.need_memory.unwrap_or(0),
+            }),
+            after: self.place.after.clone(),
         };
         let description = self.scene.bytes.chunks(CHUNK_BYTES);
         let description = description.map(|bytes| Part::Description(bytes.to_vec()));

@@ -5,6 +5,7 @@ use std::io::{self, Write};
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use image::Format;
+use indicatif::HumanBytes;
 use model::{Digest, FrameRange};
 use serde::Serialize;
 use wire::proto::{self, FrameFormat, ImageState, JobState, WorkerState};
@@ -23,6 +24,18 @@ pub(crate) struct Job {
     pub(crate) state: &'static str,
     /// Jobs of higher priority are served first.
     pub(crate) priority: i32,
+    /// Its part of the farm against the other jobs of its priority.
+    pub(crate) share: u32,
+    /// Jobs that it waits for.
+    pub(crate) after: Vec<u64>,
+    /// Labels that its workers must have.
+    pub(crate) need_labels: Vec<String>,
+    /// Fewest render threads of its workers.
+    pub(crate) need_threads: u32,
+    /// Least memory of their machines.
+    pub(crate) need_memory_bytes: u64,
+    /// The part of each frame that is rendered first, such as `0,0,64,64`.
+    pub(crate) focus: Option<String>,
     /// The frames asked for, such as `0..24`.
     pub(crate) frames: String,
     /// How many frames that is.
@@ -41,6 +54,10 @@ pub(crate) struct Job {
     pub(crate) blocks_again: u64,
     /// Pixels in them.
     pub(crate) pixels_again: u64,
+    /// Of those blocks, how many were rendered twice on purpose, near the end.
+    pub(crate) blocks_twice: u64,
+    /// Blocks of which two renderings differed.
+    pub(crate) incidents: u64,
     /// Tiles of each frame; 0 where they are cut by time.
     pub(crate) tiles_per_image: u32,
     /// Their size, such as `64x64`.
@@ -108,7 +125,7 @@ pub(crate) struct Worker {
     pub(crate) worker: String,
     /// What it calls itself.
     pub(crate) name: String,
-    /// `connected` or `away`.
+    /// `connected`, `draining`, `aside` (it gets no tiles for a while) or `away`.
     pub(crate) state: &'static str,
     /// Its render threads.
     pub(crate) threads: u32,
@@ -130,6 +147,12 @@ pub(crate) struct Worker {
     pub(crate) render_seconds: f64,
     /// When it was last heard of, milliseconds since 1970 (UTC).
     pub(crate) heard_unix_ms: u64,
+    /// Its labels.
+    pub(crate) labels: Vec<String>,
+    /// Until when it may run; null where nobody set a limit.
+    pub(crate) runs_until_unix_ms: Option<u64>,
+    /// Until when it gets no tiles, since it failed too many; null where it is trusted.
+    pub(crate) aside_until_unix_ms: Option<u64>,
 }
 
 /// `job list`.
@@ -196,6 +219,7 @@ fn hex(bytes: &[u8]) -> Option<String> {
 impl From<proto::JobSummary> for Job {
     fn from(job: proto::JobSummary) -> Self {
         let frames = job.frames.map(FrameRange::try_from);
+        let needs = job.needs.clone().unwrap_or_default();
         Self {
             state: match job.state() {
                 JobState::Unspecified | JobState::Running if job.paused => "paused",
@@ -221,6 +245,16 @@ impl From<proto::JobSummary> for Job {
             job: job.job,
             name: job.name,
             priority: job.priority,
+            share: job.share,
+            after: job.after,
+            need_labels: needs.labels,
+            need_threads: needs.threads,
+            need_memory_bytes: needs.memory_bytes,
+            focus: job
+                .focus
+                .map(|part| format!("{},{},{},{}", part.x0, part.y0, part.x1, part.y1)),
+            blocks_twice: job.blocks_twice,
+            incidents: job.incidents,
             images_total: job.images,
             images_done: job.images_done,
             images_failed: job.images_failed,
@@ -277,6 +311,8 @@ impl From<proto::WorkerStatus> for Worker {
         Self {
             worker: format!("{:016x}", worker.worker.map_or(0, |worker| worker.id)),
             state: match worker.state() {
+                WorkerState::Connected if worker.draining => "draining",
+                WorkerState::Connected if worker.aside_until_unix_ms > 0 => "aside",
                 WorkerState::Connected => "connected",
                 WorkerState::Unspecified | WorkerState::Away => "away",
             },
@@ -291,12 +327,15 @@ impl From<proto::WorkerStatus> for Worker {
             blocks: worker.blocks,
             render_seconds: seconds(worker.render_us),
             heard_unix_ms: worker.heard_unix_ms,
+            labels: worker.labels,
+            runs_until_unix_ms: time(worker.runs_until_unix_ms),
+            aside_until_unix_ms: time(worker.aside_until_unix_ms),
         }
     }
 }
 
 /// How long ago something was, for people.
-fn ago(unix_ms: u64) -> String {
+pub(crate) fn ago(unix_ms: u64) -> String {
     let then = UNIX_EPOCH + Duration::from_millis(unix_ms);
     match SystemTime::now().duration_since(then) {
         Ok(since) => format!("{} ago", duration(since)),
@@ -315,6 +354,37 @@ impl Job {
     /// How much of it is done, in per cent.
     fn percent(&self) -> u64 {
         self.pixels_done.saturating_mul(100) / self.pixels.max(1)
+    }
+
+    /// Its place among others, where it is not the usual one.
+    fn rank(&self, out: &mut dyn Write) -> io::Result<()> {
+        let mut said = Vec::new();
+        if self.priority != 0 {
+            said.push(format!("priority {}", self.priority));
+        }
+        if self.share > 1 {
+            said.push(format!("share {}", self.share));
+        }
+        if !self.after.is_empty() {
+            let after: Vec<_> = self.after.iter().map(u64::to_string).collect();
+            said.push(format!("after job {}", after.join(", ")));
+        }
+        if !self.need_labels.is_empty() {
+            said.push(format!("workers labelled {}", self.need_labels.join(", ")));
+        }
+        if self.need_threads > 0 {
+            said.push(format!("{} threads or more", self.need_threads));
+        }
+        if self.need_memory_bytes > 0 {
+            said.push(format!("{} of memory", HumanBytes(self.need_memory_bytes)));
+        }
+        if let Some(focus) = &self.focus {
+            said.push(format!("{focus} of each frame first"));
+        }
+        match said.is_empty() {
+            true => Ok(()),
+            false => writeln!(out, "  rank    {}", said.join("; ")),
+        }
     }
 
     /// From its first lease to its end.
@@ -391,6 +461,14 @@ impl Report for Job {
             self.attempts_failed,
             self.attempts_lost
         )?;
+        if self.incidents > 0 {
+            writeln!(
+                out,
+                "  WRONG   {} blocks were rendered twice with different pixels: `flyby job log {}` names the workers",
+                self.incidents, self.job
+            )?;
+        }
+        self.rank(out)?;
         write!(out, "  time    submitted {}", ago(self.submitted_unix_ms))?;
         if let Some(wall) = self.wall() {
             write!(out, ", took {}", duration(wall))?;
@@ -439,7 +517,7 @@ impl Report for Workers {
             return writeln!(out, "There are no workers: start one with `flyby worker`.");
         }
         let header = [
-            "worker", "name", "state", "threads", "simd", "tiles", "blocks", "heard",
+            "worker", "name", "state", "threads", "simd", "labels", "tiles", "blocks", "heard",
         ];
         let mut table = columns(header);
         for worker in &self.workers {
@@ -449,6 +527,7 @@ impl Report for Workers {
                 worker.state.to_owned(),
                 worker.threads.to_string(),
                 worker.simd_level.clone(),
+                worker.labels.join(","),
                 format!("{}/{}", worker.attempts, worker.credit),
                 worker.blocks.to_string(),
                 ago(worker.heard_unix_ms),

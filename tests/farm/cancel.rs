@@ -4,6 +4,21 @@ use crate::harness::scenes::{ENDLESS, FLYBY, TINY};
 use crate::harness::{Farm, wait};
 
 #[test]
+fn a_job_of_the_same_scene_as_a_cancelled_one_is_rendered() {
+    let mut farm = Farm::of_workers(0);
+    let submit = || farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..]].concat());
+    let (cancelled, job) = (submit(), submit());
+    farm.flyby(["job", "cancel", &cancelled.to_string()]).ok();
+    let folder = farm.place.state().join(format!("jobs/{cancelled}"));
+    wait::until("what the cancelled job had is gone", || {
+        (!folder.join("scene").exists()).then_some(())
+    });
+    farm.worker(&["--threads", "1"]);
+    let done = farm.wait_done(job);
+    assert_eq!(done.number("attempts_failed"), 0, "{done:?}");
+}
+
+#[test]
 fn nothing_half_done_is_left() {
     let farm = Farm::of_workers(1);
     let job = farm.submit(&ENDLESS);

@@ -13,8 +13,8 @@ use wire::auth::Token;
 use wire::proto::control_up::Message as Up;
 use wire::proto::deliver_up::Message as Deliver;
 use wire::proto::{
-    ControlDown, ControlUp, Credit, DeliverDown, DeliverHello, DeliverUp, Hello, WorkerIdentity,
-    control_down, deliver_down,
+    ControlDown, ControlUp, Credit, DeliverDown, DeliverHello, DeliverUp, Hello, TileFailed,
+    WorkerIdentity, control_down, deliver_down,
 };
 use wire::version::{PROTOCOL_MAX, PROTOCOL_MIN};
 use wire::{Failure, link};
@@ -106,6 +106,18 @@ impl Raw {
             if let Some(control_down::Message::Lease(lease)) = down.message {
                 return lease;
             }
+        }
+    }
+
+    /// Says that the tile of a lease cannot be rendered, and wants no other.
+    pub(crate) fn fail(&self, control: &mut Control, lease: &wire::proto::Lease) {
+        let failed = TileFailed {
+            attempt: lease.attempt,
+            reason: "a test has it fail".into(),
+        };
+        for message in [Up::Credit(Credit { tiles: 0 }), Up::Failed(failed)] {
+            let message = Some(message);
+            control.up.send(ControlUp { message }).unwrap();
         }
     }
 
@@ -218,6 +230,8 @@ pub(crate) fn worker(id: u64) -> Hello {
         name: format!("raw{id}"),
         worker: Some(WorkerIdentity { id, incarnation: 1 }),
         held: Vec::new(),
+        labels: Vec::new(),
+        time_left_ms: None,
     }
 }
 

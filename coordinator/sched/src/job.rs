@@ -360,6 +360,7 @@ impl Job {
             }),
             priority: self.priority,
             share: self.share,
+            needs: &self.spec.needs,
             paused: self.paused,
             focus: self.focus,
             after: &self.after,

@@ -7,7 +7,7 @@ use model::{
     Digest, FrameRange, ImageNumber, JobId, Rect, Revision, Span, SubmissionId, Timestamp, WorkerId,
 };
 
-use crate::JobOutcome;
+use crate::{JobOutcome, Needs};
 
 /// A job, as it stands.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -33,6 +33,8 @@ pub struct JobView<'a> {
     pub priority: i32,
     /// Its share of the farm among the jobs of its priority.
     pub share: u32,
+    /// What it asks of workers.
+    pub needs: &'a Needs,
     /// Whether it is paused.
     pub paused: Paused,
     /// Its region of interest.

@@ -3,7 +3,7 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::path::PathBuf;
 
-use model::{Revision, Span};
+use model::{Epoch, Revision, Span};
 
 /// What a coordinator is started with.
 #[derive(Clone, Debug)]
@@ -20,6 +20,8 @@ pub struct Config {
     pub heartbeat_interval: Span,
     /// A worker of which nothing is heard for so long is lost.
     pub liveness_limit: Span,
+    /// A program that is run whenever a job is over; `None`: none.
+    pub on_job_end: Option<PathBuf>,
     /// Limits on what others may make it hold.
     pub limits: Limits,
 }
@@ -53,8 +55,25 @@ impl Config {
             build: build.into(),
             heartbeat_interval: Span::from_secs(1),
             liveness_limit: Span::from_secs(4),
+            on_job_end: None,
             limits: Limits::default(),
         }
+    }
+}
+
+/// Most workers: all must fit into one message.
+const WORKERS_MAX: u32 = 2_000;
+
+/// How the scheduler of a coordinator decides.
+pub(crate) fn scheduling(config: &Config, epoch: Epoch) -> sched::Config {
+    sched::Config {
+        revision: Some(config.revision),
+        liveness_limit: config.liveness_limit,
+        limits: sched::Limits {
+            workers_max: WORKERS_MAX,
+            ..sched::Limits::default()
+        },
+        ..sched::Config::new(epoch)
     }
 }
 

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use model::Digest;
+use model::{Digest, JobId};
 use scene::Description;
 use tokio::fs::File;
 use tokio::io::AsyncWriteExt as _;
@@ -134,10 +134,10 @@ impl Inbox {
                 frames,
                 window: film.window,
                 tiles,
-                priority: 0,
-                share: 1,
-                needs: sched::Needs::default(),
-                after: Vec::new(),
+                priority: head.priority,
+                share: head.share.max(1),
+                needs: needs(head.needs)?,
+                after: head.after.into_iter().map(JobId).collect(),
             },
             description: Arc::new(description),
             upload,
@@ -335,6 +335,16 @@ fn formats(list: &[i32]) -> Result<image::Formats, Failure> {
         return Err(bad(image::BadFormats::TwoPngs.to_string()));
     }
     Ok(image::Formats::new(formats))
+}
+
+/// What a job asks of workers.
+fn needs(needs: Option<proto::Needs>) -> Result<sched::Needs, Failure> {
+    let needs = needs.unwrap_or_default();
+    Ok(sched::Needs {
+        labels: crate::grpc::labels(needs.labels, "head.needs.labels")?,
+        threads: needs.threads,
+        memory_bytes: needs.memory_bytes,
+    })
 }
 
 /// The last image that a range names.

@@ -1,5 +1,6 @@
 //! Everything that reaches the loop.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -25,7 +26,9 @@ pub(crate) enum Input {
     /// A submission has arrived whole.
     Submit(Box<NewJob>, Reply<proto::Submitted>),
     /// A user wants something of a job.
-    Command(JobId, Command, Reply<proto::JobSummary>),
+    Command(JobId, Wish, Reply<proto::JobSummary>),
+    /// A user wants workers to leave: these, by name or id.
+    Drain(Wanderers, Reply<proto::WorkerList>),
     /// A question; changes nothing.
     Ask(Query),
     /// A worker said hello.
@@ -94,14 +97,48 @@ pub(crate) enum Query {
         image::Format,
         Reply<(PathBuf, proto::FrameFile)>,
     ),
-    /// Where a scene's or an asset's bytes are.
-    Bytes(Digest, Wanted, Reply<PathBuf>),
+    /// Where a scene's or an asset's bytes may be; the first that is there will do.
+    Bytes(Digest, Wanted, Reply<Vec<PathBuf>>),
     /// All workers.
     Workers(Reply<proto::WorkerList>),
-    /// Why a job, or an image of it, is not finished.
-    Why(JobId, Option<ImageNumber>, Reply<proto::WhyReply>),
+    /// Why something is not finished, or has nothing to do.
+    Why(WhyOf, Reply<proto::WhyReply>),
     /// The farm.
     Info(Reply<proto::FarmInfo>),
+}
+
+/// What a user wants of a job.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wish {
+    pub(crate) command: Command,
+    /// Whether a job that is forgotten leaves no frames.
+    pub(crate) frames: Frames,
+}
+
+/// What becomes of the finished frames of a job that is forgotten.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Frames {
+    Stay,
+    Go,
+}
+
+/// Which workers are to leave.
+#[derive(Clone, Debug)]
+pub(crate) enum Wanderers {
+    All,
+    /// By name or id.
+    Named(Vec<String>),
+}
+
+/// What a question why is about.
+#[derive(Clone, Debug)]
+pub(crate) enum WhyOf {
+    Job(JobId),
+    Image(ImageRef),
+    /// The pixel at a column and a row.
+    Pixel(ImageRef, u32, u32),
+    /// By name or id.
+    Worker(String),
 }
 
 /// What is fetched by digest.
@@ -152,6 +189,9 @@ pub(crate) struct AboutWorker {
     pub(crate) build: String,
     pub(crate) simd_level: String,
     pub(crate) memory_bytes: u64,
+    pub(crate) labels: BTreeSet<String>,
+    /// How long it may still run, when it said so.
+    pub(crate) time_left: Option<Span>,
 }
 
 /// A block whose record is whole.

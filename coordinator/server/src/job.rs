@@ -228,6 +228,12 @@ impl Job {
         }
     }
 
+    /// Lets itself be watched again: it was over, and goes on.
+    pub(crate) fn admit_watchers(&mut self) {
+        self.watchers
+            .get_or_insert_with(|| broadcast::Sender::new(WATCHER_BEHIND_MAX));
+    }
+
     /// Ends all watching: nothing will change any more.
     pub(crate) fn dismiss_watchers(&mut self) {
         self.watchers = None;

@@ -8,6 +8,8 @@
 //! - `inbox`: submissions as they arrive, checked against their digests.
 //! - `storage`: a thread that writes blocks at their place, makes them durable and keeps the store, and one
 //!   that encodes finished images. `about`, `scene_files`: what else is kept of a job.
+//! - `hook`: the operator's program that is run when a job is over.
+//! - `space`: what a job needs of the disk, and what the disk has.
 //! - `job`, `worker`: what is known of them beside what the scheduler knows: log, files,
 //!   watchers; links.
 //!
@@ -17,11 +19,13 @@ mod about;
 mod clock;
 mod config;
 mod grpc;
+mod hook;
 mod inbox;
 mod input;
 mod job;
 mod scene_files;
 mod shell;
+mod space;
 mod start;
 mod state;
 mod storage;

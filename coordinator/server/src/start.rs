@@ -117,7 +117,7 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
     shell.recall(kept);
     let shell = tokio::spawn(shell.run(heard, taken));
-    let door = Arc::new(Door::new(inputs.clone(), config, &state));
+    let door = Arc::new(Door::new(inputs.clone(), config, state.clone()));
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();
     let server = tokio::spawn(grpc::serve(listener, token.clone(), door, async {

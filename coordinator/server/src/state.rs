@@ -22,6 +22,8 @@ use model::{Epoch, ImageNumber, ImageRef, JobId};
 use wire::auth::Token;
 use wire::place::{COORDINATOR_FILE, Coordinator, TOKEN_FILE};
 
+use crate::input::Frames;
+
 /// The folder among those of jobs where submissions arrive.
 const ARRIVING: &str = "arriving";
 
@@ -146,7 +148,7 @@ impl State {
             let job = job.filter(|job| jobs.contains(job));
             remove_unfinished(&entry.path().join("frames"));
             let Some(job) = job else {
-                JobFolders::at(entry.path()).forget()?;
+                JobFolders::at(entry.path()).forget(Frames::Stay)?;
                 continue;
             };
             let Ok(scratch) = fs::read_dir(entry.path().join("scratch")) else {
@@ -169,10 +171,22 @@ impl State {
 
     /// The largest number of a job that has a folder.
     pub(crate) fn last_job_folder(&self) -> JobId {
+        self.job_folders().pop().unwrap_or(JobId(0))
+    }
+
+    /// The folder itself.
+    pub(crate) fn root(&self) -> &Path {
+        &self.root
+    }
+
+    /// The numbers of all jobs that have a folder, in order.
+    pub(crate) fn job_folders(&self) -> Vec<JobId> {
         let listed = fs::read_dir(self.root.join("jobs"));
         let names = listed.into_iter().flatten().flatten();
         let numbers = names.filter_map(|entry| entry.file_name().to_str()?.parse().ok());
-        JobId(numbers.max().unwrap_or(0))
+        let mut jobs: Vec<_> = numbers.map(JobId).collect();
+        jobs.sort_unstable();
+        jobs
     }
 
     /// Says where this coordinator listens.
@@ -210,10 +224,13 @@ impl JobFolders {
         make_folder(&self.scratch)
     }
 
-    /// Removes all but finished frames.
-    pub(crate) fn forget(&self) -> Result<(), StateError> {
+    /// Removes all; finished frames only where they are to go.
+    pub(crate) fn forget(&self, frames: Frames) -> Result<(), StateError> {
         remove_all(&self.scratch)?;
         remove_all(&self.scene)?;
+        if frames == Frames::Go {
+            remove_all(&self.frames)?;
+        }
         // Both succeed only where nothing is left inside.
         let _ = fs::remove_dir(&self.frames);
         let _ = fs::remove_dir(&self.root);

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use model::WorkerId;
+use model::{Timestamp, WorkerId};
 use sched::LinkId;
 use wire::proto;
 
@@ -21,12 +21,28 @@ pub(crate) struct Worker {
     pub(crate) control: Option<Link<proto::ControlDown>>,
     /// Its delivery stream, while that is open.
     pub(crate) delivery: Option<Link<proto::DeliverDown>>,
+    /// Whether it was told to leave, or is to be told when it comes back.
+    pub(crate) draining: Draining,
+    /// Until when it may run.
+    pub(crate) runs_until: Option<Timestamp>,
+}
+
+/// Whether a worker is to finish what it holds and leave.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Draining {
+    No,
+    Yes,
 }
 
 impl Worker {
     /// Whether this is its open control stream.
     pub(crate) fn is_control(&self, link: LinkId) -> bool {
         self.control.as_ref().is_some_and(|open| open.id == link)
+    }
+
+    /// Whether this is what it calls itself, or its id.
+    pub(crate) fn is_called(&self, id: WorkerId, name: &str) -> bool {
+        self.about.name == name || format!("{:016x}", id.id) == name
     }
 
     /// Tells it something. A worker that reads too slowly is cut off: it may come back.

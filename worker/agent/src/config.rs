@@ -5,6 +5,7 @@ use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
+use model::Span;
 use wire::auth::Token;
 
 /// What a worker is started with. None of it changes a pixel.
@@ -26,6 +27,10 @@ pub struct Config {
     pub build: String,
     /// The memory of this machine in bytes; 0 is not known.
     pub memory_bytes: u64,
+    /// Labels that jobs may ask for.
+    pub labels: Vec<String>,
+    /// How long it may run from its start; it leaves in time. `None`: nobody set a limit.
+    pub time_limit: Option<Span>,
 }
 
 impl Config {
@@ -45,6 +50,8 @@ impl Config {
             state: None,
             build: String::new(),
             memory_bytes: 0,
+            labels: Vec::new(),
+            time_limit: None,
         }
     }
 }

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use model::{AttemptId, Rect, Timestamp, WorkerId};
+use model::{AttemptId, Rect, Span, Timestamp, WorkerId};
 use session::{BlockVerdict, Event, ExitReason, Retry, Session};
 use tokio::sync::{mpsc, watch};
 use tokio::task::JoinHandle;
@@ -32,6 +32,15 @@ const INPUTS_MAX: usize = 256;
 /// Images kept open beside one for each thread.
 const IMAGES_AHEAD: usize = 2;
 
+/// Time kept at the end of a limit for delivering what is rendered, at most this and a tenth of the limit.
+const LEAVING: Duration = Duration::from_secs(10);
+
+/// How much of a time limit may be rendered in.
+fn useful(limit: Span) -> Duration {
+    let limit = Duration::from_micros(limit.0);
+    limit - LEAVING.min(limit / 10)
+}
+
 /// Runs a worker until it is let go, asked to stop, refused for good, or gives up.
 pub async fn run(
     config: Config,
@@ -42,6 +51,7 @@ pub async fn run(
     let mut shell = Shell::new(config, painter, inputs)?;
     shell.feed(Event::Started).await;
     let mut heard = true;
+    let mut leave_at = shell.leave_at;
     while shell.exit.is_none() {
         let tick_at = shell.session.next_deadline();
         let tick_at = tick_at.map(|at| shell.origin + Duration::from_micros(at.0));
@@ -53,6 +63,11 @@ pub async fn run(
             },
             Some(input) = taken.recv() => shell.take(input).await,
             () = wait_until(tick_at) => shell.feed(Event::Tick).await,
+            () = wait_until(leave_at) => {
+                tracing::info!("the time limit is near: what is rendered is delivered, and the rest is given back");
+                leave_at = None;
+                shell.feed(Event::StopAsked).await;
+            }
         }
     }
     drop(taken);
@@ -63,6 +78,8 @@ pub async fn run(
 struct Shell {
     session: Session,
     origin: Instant,
+    /// When it leaves by itself.
+    leave_at: Option<Instant>,
     config: Config,
     worker: WorkerId,
     painter: Arc<dyn Painter>,
@@ -99,13 +116,15 @@ impl Shell {
         settings.backoff.key = identity::draw()?;
         let images_max = (threads as usize).saturating_add(IMAGES_AHEAD);
         let images = Images::new(painter.clone(), images_max);
+        let origin = Instant::now();
         Ok(Self {
             worker: identity::worker(config.state.as_deref())?,
             pool: Pool::start(threads, images, inputs.clone())?,
             scenes: Arc::new(Scenes::new(config.state.as_deref())),
             blocks_max: settings.unacked_blocks_max as usize,
             session: Session::new(settings),
-            origin: Instant::now(),
+            origin,
+            leave_at: config.time_limit.map(|limit| origin + useful(limit)),
             config,
             painter,
             inputs,
@@ -134,6 +153,12 @@ impl Shell {
                 }
             }
         }
+    }
+
+    /// How long it may still render.
+    fn time_left(&self) -> Option<Duration> {
+        self.leave_at
+            .map(|at| at.saturating_duration_since(Instant::now()))
     }
 
     fn now(&self) -> Timestamp {

@@ -17,13 +17,21 @@ const AHEAD: usize = 2;
 /// What a stream of chunks is made of.
 pub(super) type Chunks<T> = ReceiverStream<Result<T, Status>>;
 
-/// Sends a file; `chunk` makes a message of the file's length, the place of the
+/// Sends the first of these files that is there; `chunk` makes a message of the file's length, the place of the
 /// chunk in it, and the chunk's bytes. An empty file is one empty chunk.
 pub(super) async fn send_file<T: Send + 'static>(
-    path: PathBuf,
+    paths: Vec<PathBuf>,
     chunk: impl Fn(u64, u64, Vec<u8>) -> T + Send + 'static,
 ) -> Result<Chunks<T>, Failure> {
-    let mut file = File::open(&path).await.map_err(gone)?;
+    let mut file = Err(std::io::ErrorKind::NotFound.into());
+    for path in paths {
+        file = File::open(&path).await;
+        let is_gone = |error: &std::io::Error| error.kind() == std::io::ErrorKind::NotFound;
+        if !file.as_ref().is_err_and(is_gone) {
+            break;
+        }
+    }
+    let mut file = file.map_err(gone)?;
     let length = file.metadata().await.map_err(gone)?.len();
     let (sender, receiver) = mpsc::channel(AHEAD);
     tokio::spawn(async move {

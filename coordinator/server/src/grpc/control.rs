@@ -1,6 +1,6 @@
 //! A worker's control stream.
 
-use model::{Revision, WorkerId};
+use model::{Revision, Span, WorkerId};
 use sched::{Event, LinkId};
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
@@ -10,7 +10,7 @@ use wire::proto::{self, ErrorKind};
 use wire::version::{PROTOCOL_MAX, PROTOCOL_MIN, agree};
 use wire::{BadMessage, Failure, convert};
 
-use super::{Door, HELLO_TIMEOUT};
+use super::{Door, HELLO_TIMEOUT, labels};
 use crate::input::{AboutWorker, Greeting, Input, Link};
 
 /// Most attempts that one message may name.
@@ -116,8 +116,14 @@ fn greeting(hello: proto::Hello, link: Link<proto::ControlDown>) -> Result<Greet
             build: convert::text(hello.build, "hello.build", 0..=200)?,
             simd_level: convert::text(hello.simd_level, "hello.simd_level", 0..=200)?,
             memory_bytes: hello.memory_bytes,
+            labels: labels(hello.labels, "hello.labels")?,
+            time_left: hello.time_left_ms.map(span),
         },
     })
+}
+
+fn span(milliseconds: u64) -> Span {
+    Span(milliseconds.saturating_mul(1_000))
 }
 
 fn wrong_protocol(min: u32, max: u32) -> Failure {

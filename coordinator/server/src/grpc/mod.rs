@@ -4,11 +4,13 @@
 //! here decides anything about the farm.
 
 mod bytes;
+mod clean;
 mod control;
 mod delivery;
 mod user;
 mod workers;
 
+use std::collections::BTreeSet;
 use std::future::Future;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -21,20 +23,24 @@ use tonic::service::interceptor::InterceptedService;
 use tonic::transport::Server;
 use tonic::transport::server::TcpIncoming;
 use tonic::{Request, Status};
-use wire::Failure;
 use wire::auth::Token;
 use wire::link;
 use wire::proto::farm_server::FarmServer;
 use wire::proto::workers_server::WorkersServer;
 use wire::proto::{self, ErrorKind};
+use wire::{BadMessage, Failure, convert};
 
 use crate::config::Config;
 use crate::inbox::Inbox;
 use crate::input::{Input, Reply};
+use crate::space::Space;
 use crate::state::State;
 
 /// Most calls at the same time on one connection.
 const STREAMS_MAX: u32 = 256;
+
+/// Most bytes of a label.
+const LABEL_BYTES_MAX: usize = 64;
 
 /// How long whoever opens a stream may take to say who it is.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
@@ -44,6 +50,7 @@ const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
 pub(crate) struct Door {
     inputs: mpsc::Sender<Input>,
     config: Arc<Config>,
+    state: Arc<State>,
     inbox: Inbox,
     submissions: Arc<Semaphore>,
     blocks: Arc<Semaphore>,
@@ -52,7 +59,7 @@ pub(crate) struct Door {
 }
 
 impl Door {
-    pub(crate) fn new(inputs: mpsc::Sender<Input>, config: Arc<Config>, state: &State) -> Self {
+    pub(crate) fn new(inputs: mpsc::Sender<Input>, config: Arc<Config>, state: Arc<State>) -> Self {
         let limits = &config.limits;
         Self {
             inputs,
@@ -62,6 +69,7 @@ impl Door {
             watchers: Arc::new(Semaphore::new(limits.watchers_max)),
             next_link: AtomicU64::new(1),
             config,
+            state,
         }
     }
 
@@ -75,6 +83,13 @@ impl Door {
         let (reply, answer) = oneshot::channel();
         self.feed(input(reply)).await?;
         answer.await.unwrap_or_else(|_| Err(stopping()))
+    }
+
+    /// How much room the disk of the state folder has.
+    async fn space(&self) -> Option<Space> {
+        let state = self.state.clone();
+        let asked = tokio::task::spawn_blocking(move || Space::at(state.root()));
+        asked.await.ok().flatten()
     }
 
     fn next_link(&self) -> LinkId {
@@ -113,6 +128,15 @@ pub(crate) async fn serve(
         .add_service(InterceptedService::new(workers, check))
         .serve_with_incoming_shutdown(TcpIncoming::from(listener).with_nodelay(Some(true)), stop)
         .await
+}
+
+/// Labels of a worker, or that a job asks for; how many there may be is the scheduler's to say.
+pub(crate) fn labels(
+    labels: Vec<String>,
+    field: &'static str,
+) -> Result<BTreeSet<String>, BadMessage> {
+    let label = |label| convert::text(label, field, 1..=LABEL_BYTES_MAX);
+    labels.into_iter().map(label).collect()
 }
 
 /// A format as a message names it.

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use model::{ImageNumber, JobId};
+use model::{ImageNumber, ImageRef, JobId, Rect};
 use sched::Command;
 use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc};
 use tokio_stream::wrappers::ReceiverStream;
@@ -13,7 +13,8 @@ use wire::proto::{self, ErrorKind};
 
 use super::Door;
 use super::bytes::{Chunks, send_file};
-use crate::input::{Input, Query, Snapshot};
+use crate::input::{Frames, Input, Query, Snapshot, Wanderers, WhyOf, Wish};
+use crate::space;
 
 /// Updates that wait for one watcher; what follows waits in the job's own channel.
 const UPDATES_AHEAD: usize = 4;
@@ -34,10 +35,16 @@ impl Farm for Door {
         })?;
         let mut parts = request.into_inner();
         let new = self.inbox.receive(self.config.revision, &mut parts).await?;
+        let needed = space::needed(&new.submission, new.formats);
         let submitted = self
             .ask(|reply| Input::Submit(Box::new(new), reply))
             .await?;
-        Ok(Response::new(submitted))
+        let space = self.space().await;
+        Ok(Response::new(proto::Submitted {
+            disk_needed_bytes: needed,
+            disk_free_bytes: space.map(|space| space.free),
+            ..submitted
+        }))
     }
 
     async fn list_jobs(&self, _: Request<proto::ListJobsRequest>) -> Answer<proto::JobList> {
@@ -82,8 +89,11 @@ impl Farm for Door {
 
     async fn cancel_job(&self, request: Request<proto::JobRequest>) -> Answer<proto::JobSummary> {
         let job = JobId(request.get_ref().job);
-        let cancel = Command::Cancel;
-        let summary = self.ask(|reply| Input::Command(job, cancel, reply)).await?;
+        let wish = Wish {
+            command: Command::Cancel,
+            frames: Frames::Stay,
+        };
+        let summary = self.ask(|reply| Input::Command(job, wish, reply)).await?;
         Ok(Response::new(summary))
     }
 
@@ -91,28 +101,67 @@ impl Farm for Door {
         use proto::job_command::Command as Wanted;
         let request = request.get_ref();
         let job = JobId(request.job);
+        let mut frames = Frames::Stay;
         let command = match &request.command {
             Some(Wanted::Pause(_)) => Command::Pause,
             Some(Wanted::Resume(_)) => Command::Resume,
             Some(Wanted::Priority(wanted)) => Command::Priority(wanted.priority),
-            Some(Wanted::Remove(_)) => Command::Remove,
+            Some(Wanted::Remove(wanted)) => {
+                if wanted.frames {
+                    frames = Frames::Go;
+                }
+                Command::Remove
+            }
+            Some(Wanted::Retry(_)) => Command::Retry,
+            Some(Wanted::Again(wanted)) => Command::Again(ImageNumber(wanted.image)),
+            Some(Wanted::Share(wanted)) => Command::Share(wanted.share),
+            Some(Wanted::Focus(wanted)) => {
+                let region = wanted.region.map(Rect::try_from).transpose();
+                Command::Focus(region.map_err(Failure::from)?)
+            }
             None => {
                 let sentence = "the command is of no kind that this coordinator knows";
                 return Err(Failure::new(ErrorKind::BadRequest, sentence).into());
             }
         };
-        let summary = self
-            .ask(|reply| Input::Command(job, command, reply))
-            .await?;
+        let wish = Wish { command, frames };
+        let summary = self.ask(|reply| Input::Command(job, wish, reply)).await?;
         Ok(Response::new(summary))
+    }
+
+    async fn clean(&self, request: Request<proto::CleanRequest>) -> Answer<proto::CleanReply> {
+        Ok(Response::new(
+            super::clean::clean(self, request.into_inner()).await?,
+        ))
+    }
+
+    async fn drain_workers(
+        &self,
+        request: Request<proto::DrainRequest>,
+    ) -> Answer<proto::WorkerList> {
+        let proto::DrainRequest { workers, all } = request.into_inner();
+        let whom = match all {
+            true => Wanderers::All,
+            false => Wanderers::Named(workers),
+        };
+        let workers = self.ask(|reply| Input::Drain(whom, reply)).await?;
+        Ok(Response::new(workers))
     }
 
     async fn why(&self, request: Request<proto::WhyRequest>) -> Answer<proto::WhyReply> {
         let request = request.get_ref();
-        let (job, image) = (JobId(request.job), request.image.map(ImageNumber));
-        let why = self
-            .ask(|reply| Input::Ask(Query::Why(job, image, reply)))
-            .await?;
+        let job = JobId(request.job);
+        let image = request.image.map(|image| ImageRef {
+            job,
+            image: ImageNumber(image),
+        });
+        let of = match (&request.worker, image, request.pixel) {
+            (Some(worker), _, _) => WhyOf::Worker(worker.clone()),
+            (None, None, _) => WhyOf::Job(job),
+            (None, Some(image), None) => WhyOf::Image(image),
+            (None, Some(image), Some(pixel)) => WhyOf::Pixel(image, pixel.x, pixel.y),
+        };
+        let why = self.ask(|reply| Input::Ask(Query::Why(of, reply))).await?;
         Ok(Response::new(why))
     }
 
@@ -134,7 +183,7 @@ impl Farm for Door {
         let (path, file) = self
             .ask(|reply| Input::Ask(Query::Frame(job, image, format, reply)))
             .await?;
-        let chunks = send_file(path, move |_, place, data| proto::FrameChunk {
+        let chunks = send_file(vec![path], move |_, place, data| proto::FrameChunk {
             file: (place == 0).then(|| file.clone()),
             data,
         });
@@ -151,7 +200,12 @@ impl Farm for Door {
 
     async fn info(&self, _: Request<proto::InfoRequest>) -> Answer<proto::FarmInfo> {
         let info = self.ask(|reply| Input::Ask(Query::Info(reply))).await?;
-        Ok(Response::new(info))
+        let space = self.space().await;
+        Ok(Response::new(proto::FarmInfo {
+            disk_free_bytes: space.map(|space| space.free),
+            disk_bytes: space.map(|space| space.all),
+            ..info
+        }))
     }
 }
 

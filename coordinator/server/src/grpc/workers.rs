@@ -60,10 +60,10 @@ async fn fetch(
     wanted: Wanted,
 ) -> Result<Response<Chunks<proto::FetchChunk>>, Status> {
     let digest = convert::digest(&request.get_ref().digest, "digest")?;
-    let path = door
+    let paths = door
         .ask(|reply| Input::Ask(Query::Bytes(digest, wanted, reply)))
         .await?;
-    let chunks = send_file(path, |bytes, _, data| proto::FetchChunk {
+    let chunks = send_file(paths, |bytes, _, data| proto::FetchChunk {
         bytes,
         data: data.into(),
     });

@@ -15,9 +15,10 @@ use wire::proto::{self, ErrorKind, control_down, deliver_down};
 use super::{Shell, Submitting};
 use crate::about::JobAbout;
 use crate::inbox::NewJob;
+use crate::input::Frames;
 use crate::job::Job;
 use crate::storage::{Era, Plan};
-use crate::worker::Told;
+use crate::worker::{Draining, Told, Worker};
 
 impl Shell {
     /// Performs one effect.
@@ -102,7 +103,7 @@ impl Shell {
             Effect::DropJob { job } => {
                 if let Some(job) = self.jobs.get(job) {
                     job.plan.cancelled.store(true, Ordering::Relaxed);
-                    self.storage.forget(job.folders().clone());
+                    self.storage.forget(job.folders().clone(), Frames::Stay);
                 }
             }
             Effect::JobDone { job, outcome } => self.job_done(job, outcome),
@@ -127,7 +128,11 @@ impl Shell {
         let known = self.jobs.get(id);
         let same = known.is_some_and(|known| known.formats() == waiting.formats);
         let answer = match same || !again {
-            true => Ok(proto::Submitted { job: id.0, again }),
+            true => Ok(proto::Submitted {
+                job: id.0,
+                again,
+                ..proto::Submitted::default()
+            }),
             false => Err(Failure::new(
                 ErrorKind::Conflict,
                 sched::SubmitRefusal::SubmissionReused.to_string(),
@@ -205,14 +210,18 @@ impl Shell {
         let answer = match refusal {
             Some(refusal) => Err(Failure::new(ErrorKind::BadRequest, refusal.to_string())),
             None => {
-                let said = match waiting.command {
-                    Command::Pause => "paused by its user".to_owned(),
-                    Command::Resume => "resumed by its user".to_owned(),
-                    Command::Priority(priority) => format!("its priority is {priority} now"),
-                    _ => String::new(),
-                };
-                if !said.is_empty() {
+                if let Some(said) = command_words(waiting.command) {
                     self.say(id, said);
+                }
+                if waiting.command == Command::Remove && waiting.frames == Frames::Go {
+                    self.removing.insert(id);
+                }
+                let goes_on = self
+                    .sched
+                    .job(id)
+                    .is_some_and(|view| view.state == sched::JobState::Running);
+                if goes_on && let Some(job) = self.jobs.get_mut(id) {
+                    job.admit_watchers();
                 }
                 Ok(self.summary(id).unwrap_or(waiting.before))
             }
@@ -227,7 +236,11 @@ impl Shell {
         };
         self.eras.retain(|image, _| image.job != id);
         self.storage.record(Entry::Forgotten { job: id }, None);
-        self.storage.forget(job.folders().clone());
+        let frames = match self.removing.remove(&id) {
+            true => Frames::Go,
+            false => Frames::Stay,
+        };
+        self.storage.forget(job.folders().clone(), frames);
     }
 
     fn answer_submission(
@@ -252,6 +265,10 @@ impl Shell {
             live: live.into_iter().map(Into::into).collect(),
         };
         self.tell(worker, control_down::Message::Welcome(welcome));
+        let is_leaving = |known: &Worker| known.draining == Draining::Yes;
+        if self.workers.get(&worker).is_some_and(is_leaving) {
+            self.tell(worker, control_down::Message::Drain(proto::Drain {}));
+        }
     }
 
     fn refuse_worker(&mut self, id: WorkerId, refusal: WorkerRefusal) {
@@ -307,6 +324,22 @@ impl Shell {
             );
         }
         self.say(id, format!("the job is {words}"));
+        if let (Some(view), Some(job)) = (self.sched.job(id), self.jobs.get(id)) {
+            self.hook.job_ended(|| {
+                vec![
+                    ("FLYBY_JOB", id.to_string()),
+                    ("FLYBY_JOB_NAME", view.name.to_owned()),
+                    ("FLYBY_JOB_STATE", state_word(outcome).to_owned()),
+                    ("FLYBY_JOB_FRAMES", view.frames.to_string()),
+                    ("FLYBY_JOB_FRAMES_DONE", view.images.encoded.to_string()),
+                    ("FLYBY_JOB_FRAMES_FAILED", view.images.failed.to_string()),
+                    (
+                        "FLYBY_JOB_FOLDER",
+                        job.folders().frames.display().to_string(),
+                    ),
+                ]
+            });
+        }
         if let Some(job) = self.jobs.get_mut(id) {
             // No event of its own told of images that were never begun.
             for image in self.sched.images(id) {
@@ -406,7 +439,7 @@ impl Shell {
         }
     }
 
-    fn tell(&mut self, id: WorkerId, message: control_down::Message) {
+    pub(super) fn tell(&mut self, id: WorkerId, message: control_down::Message) {
         if let Some(worker) = self.workers.get_mut(&id)
             && worker.tell(message) == Told::Cut
         {
@@ -455,6 +488,33 @@ fn stem(name: &str, scene: &str) -> String {
         .into_iter()
         .find(|stem| !stem.is_empty())
         .unwrap_or_else(|| "frame".to_owned())
+}
+
+/// How a job ended, in one word, as `flyby job list` says it.
+fn state_word(outcome: JobOutcome) -> &'static str {
+    match outcome {
+        JobOutcome::Finished => "done",
+        JobOutcome::Failed => "failed",
+        JobOutcome::Cancelled => "cancelled",
+    }
+}
+
+/// What a job's log says of a command that was followed.
+fn command_words(command: Command) -> Option<String> {
+    Some(match command {
+        Command::Pause => "paused by its user".to_owned(),
+        Command::Resume => "resumed by its user".to_owned(),
+        Command::Retry => "its failed frames are rendered again".to_owned(),
+        Command::Again(image) => format!("frame {image} is rendered again"),
+        Command::Priority(priority) => format!("its priority is {priority} now"),
+        Command::Share(share) => format!("its share is {share} now"),
+        Command::Focus(None) => "no part of its frames comes before others".to_owned(),
+        Command::Focus(Some(region)) => format!(
+            "{},{} to {},{} of each frame comes first",
+            region.x0, region.y0, region.x1, region.y1
+        ),
+        Command::Cancel | Command::Remove => return None,
+    })
 }
 
 fn revoke_words(reason: RevokeReason) -> &'static str {

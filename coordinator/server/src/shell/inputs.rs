@@ -1,18 +1,16 @@
 //! From inputs to events.
 
-use std::collections::BTreeSet;
-
 use model::{ImageRef, JobId, WorkerId};
-use sched::{BlockRefusal, Command, Event, LinkId, Offer, Verdict};
-use wire::proto::{self, ErrorKind, deliver_down};
+use sched::{BlockRefusal, Event, LinkId, Offer, Verdict};
+use wire::proto::{self, ErrorKind, control_down, deliver_down};
 use wire::{Failure, convert};
 
 use super::{Commanding, Next, Shell, Submitting};
 use crate::inbox::NewJob;
-use crate::input::{Arrived, Greeting, Input, Link, News, Reply};
+use crate::input::{Arrived, Greeting, Input, Link, News, Reply, Wanderers, Wish};
 use crate::job::Sign;
 use crate::storage::{Encoded, Hand, Stored};
-use crate::worker::Worker;
+use crate::worker::{Draining, Worker};
 
 impl Shell {
     /// Hears what the coordinator itself has to say.
@@ -36,7 +34,10 @@ impl Shell {
     pub(super) fn take(&mut self, input: Input) {
         match input {
             Input::Submit(new, reply) => self.submit(new, reply),
-            Input::Command(job, command, reply) => self.command(job, command, reply),
+            Input::Command(job, wish, reply) => self.command(job, wish, reply),
+            Input::Drain(whom, reply) => {
+                let _ = reply.send(self.drain(&whom));
+            }
             Input::Ask(query) => self.answer(query),
             Input::Hello(greeting) => self.greet(*greeting),
             Input::Said {
@@ -95,12 +96,17 @@ impl Shell {
                 revision,
                 threads,
                 memory_bytes: about.memory_bytes,
-                labels: BTreeSet::new(),
-                time_left: None,
+                labels: about.labels.clone(),
+                time_left: about.time_left,
             },
             held,
         };
         // An older link of the same process is dropped with its streams.
+        let draining = self
+            .workers
+            .get(&worker)
+            .map_or(Draining::No, |known| known.draining);
+        let runs_until = about.time_left.map(|left| self.now() + left);
         self.workers.insert(
             worker,
             Worker {
@@ -108,6 +114,8 @@ impl Shell {
                 protocol,
                 control: Some(link),
                 delivery: None,
+                draining,
+                runs_until,
             },
         );
         self.feed(event);
@@ -150,17 +158,59 @@ impl Shell {
     }
 
     /// Does what a user wants of a job; answers with the job as it is then, or was where it is forgotten.
-    fn command(&mut self, job: JobId, command: Command, reply: Reply<proto::JobSummary>) {
+    fn command(&mut self, job: JobId, wish: Wish, reply: Reply<proto::JobSummary>) {
         let Some(before) = self.summary(job) else {
             let _ = reply.send(Err(super::views::no_job(job)));
             return;
         };
+        let Wish { command, frames } = wish;
         self.commanding.push_back(Commanding {
             command,
+            frames,
             before,
             reply,
         });
         self.feed(Event::Command { job, command });
+    }
+
+    /// Has workers finish what they hold and leave; one that is away is told when it comes back.
+    fn drain(&mut self, whom: &Wanderers) -> Result<proto::WorkerList, Failure> {
+        let ids: Vec<WorkerId> = match whom {
+            Wanderers::All => self.workers.keys().copied().collect(),
+            Wanderers::Named(names) => {
+                let mut ids = Vec::new();
+                for name in names {
+                    let called = self.workers_called(name);
+                    if called.is_empty() {
+                        return Err(super::views::no_worker(name));
+                    }
+                    ids.extend(called);
+                }
+                ids
+            }
+        };
+        for id in &ids {
+            if let Some(worker) = self.workers.get_mut(id) {
+                worker.draining = Draining::Yes;
+                tracing::info!(worker = %id, name = worker.about.name, "a worker is told to leave");
+            }
+            self.tell(*id, control_down::Message::Drain(proto::Drain {}));
+        }
+        let told = self
+            .sched
+            .workers()
+            .filter(|view| ids.contains(&view.worker));
+        let workers = told
+            .map(|view| super::views::worker_status(&view, self.workers.get(&view.worker)))
+            .collect();
+        Ok(proto::WorkerList { workers })
+    }
+
+    /// The workers of this name or id.
+    pub(super) fn workers_called(&self, name: &str) -> Vec<WorkerId> {
+        let workers = self.workers.iter();
+        let called = workers.filter(|(id, worker)| worker.is_called(**id, name));
+        called.map(|(id, _)| *id).collect()
     }
 
     /// A thread of the disk waits, or waits no more. While the writer waits nobody is late.

@@ -15,20 +15,21 @@ mod queries;
 mod recall;
 mod views;
 
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
-use model::{ImageRef, SubmissionId, Timestamp};
+use model::{ImageRef, JobId, SubmissionId, Timestamp};
 use sched::{Command, Event, Sched};
 use tokio::sync::mpsc;
 use tokio::time::Instant;
 use wire::proto;
 
 use crate::clock::Clock;
-use crate::config::Config;
+use crate::config::{Config, scheduling};
+use crate::hook::Hook;
 use crate::inbox::NewJob;
-use crate::input::{Input, News, Reply};
+use crate::input::{Frames, Input, News, Reply};
 use crate::job::Jobs;
 use crate::state::State;
 use crate::storage::{Era, Hand, Storage};
@@ -39,9 +40,6 @@ pub(crate) use self::recall::Kept;
 
 /// How often watchers are told of changes, at most.
 const WATCH_INTERVAL: Duration = Duration::from_millis(100);
-
-/// Most workers: all must fit into one message.
-const WORKERS_MAX: u32 = 2_000;
 
 /// Inputs that are taken before a tick that is due. What had arrived before a pause of the
 /// coordinator is thus heard before anyone is blamed for being silent during it.
@@ -63,6 +61,9 @@ pub(crate) struct Shell {
     arriving: Option<Box<NewJob>>,
     /// Commands that were fed and are not answered, in order.
     commanding: VecDeque<Commanding>,
+    /// Jobs that leave no frames when they are forgotten.
+    removing: BTreeSet<JobId>,
+    hook: Hook,
     held: Held,
     /// Eras of images that are not in their first.
     eras: BTreeMap<ImageRef, Era>,
@@ -84,6 +85,7 @@ struct Submitting {
 #[derive(Debug)]
 struct Commanding {
     command: Command,
+    frames: Frames,
     /// The job as it was before.
     before: proto::JobSummary,
     reply: Reply<proto::JobSummary>,
@@ -104,16 +106,9 @@ impl Shell {
         clock: Clock,
         storage: Storage,
     ) -> Self {
-        let sched = Sched::new(sched::Config {
-            revision: Some(config.revision),
-            liveness_limit: config.liveness_limit,
-            limits: sched::Limits {
-                workers_max: WORKERS_MAX,
-                ..sched::Limits::default()
-            },
-            ..sched::Config::new(state.epoch())
-        });
+        let sched = Sched::new(scheduling(&config, state.epoch()));
         Self {
+            hook: Hook::start(config.on_job_end.clone()),
             sched,
             clock,
             config,
@@ -124,6 +119,7 @@ impl Shell {
             submitting: VecDeque::new(),
             arriving: None,
             commanding: VecDeque::new(),
+            removing: BTreeSet::new(),
             held: Held::default(),
             eras: BTreeMap::new(),
             troubles: BTreeMap::new(),

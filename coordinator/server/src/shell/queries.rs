@@ -7,7 +7,7 @@ use wire::proto::{self, ErrorKind};
 
 use super::{Shell, views};
 use crate::clock::unix_ms;
-use crate::input::{Query, Snapshot, Wanted};
+use crate::input::{Query, Snapshot, Wanted, WhyOf};
 use crate::job::IMAGES_PER_MESSAGE;
 
 impl Shell {
@@ -45,8 +45,8 @@ impl Shell {
                     .collect();
                 let _ = reply.send(Ok(proto::WorkerList { workers }));
             }
-            Query::Why(job, image, reply) => {
-                let _ = reply.send(self.why(job, image));
+            Query::Why(of, reply) => {
+                let _ = reply.send(self.why(&of));
             }
             Query::Info(reply) => {
                 let _ = reply.send(Ok(self.info()));
@@ -60,18 +60,19 @@ impl Shell {
         Some(views::summary(&view, self.jobs.get(id)?))
     }
 
-    /// Why a job, or an image of it, is not finished.
-    fn why(&self, job: JobId, image: Option<ImageNumber>) -> Result<proto::WhyReply, Failure> {
-        let of_job = self.sched.why_job(job).ok_or_else(|| views::no_job(job))?;
-        let sentence = match image {
-            None => of_job.to_string(),
-            Some(image) => {
-                let why = self.sched.why_image(ImageRef { job, image });
-                let no_image = || {
-                    let sentence = format!("job {job} has no frame {image}");
-                    Failure::new(ErrorKind::NotFound, sentence)
-                };
-                why.ok_or_else(no_image)?.to_string()
+    /// Why something is not finished, or has nothing to do.
+    fn why(&self, of: &WhyOf) -> Result<proto::WhyReply, Failure> {
+        let sentence = match of {
+            WhyOf::Job(job) => {
+                let why = self.sched.why_job(*job);
+                why.ok_or_else(|| views::no_job(*job))?.to_string()
+            }
+            WhyOf::Image(image) => self.why_image(*image)?.to_string(),
+            WhyOf::Pixel(image, x, y) => self.why_pixel(*image, *x, *y)?,
+            WhyOf::Worker(name) => {
+                let called = self.workers_called(name);
+                let why = called.first().and_then(|id| self.sched.why_worker(*id));
+                why.ok_or_else(|| views::no_worker(name))?.to_string()
             }
         };
         // Nothing else matters while nothing can be kept.
@@ -80,6 +81,46 @@ impl Shell {
             None => sentence,
         };
         Ok(proto::WhyReply { sentence })
+    }
+
+    fn why_image(&self, image: ImageRef) -> Result<sched::WhyImage, Failure> {
+        let known = self.sched.job(image.job);
+        known.ok_or_else(|| views::no_job(image.job))?;
+        let why = self.sched.why_image(image);
+        why.ok_or_else(|| not_found(format!("job {} has no frame {}", image.job, image.image)))
+    }
+
+    fn why_pixel(&self, image: ImageRef, x: u32, y: u32) -> Result<String, Failure> {
+        self.why_image(image)?;
+        let pixel = model::Rect {
+            x0: x,
+            y0: y,
+            x1: x.saturating_add(1),
+            y1: y.saturating_add(1),
+        };
+        let why = self.sched.why_tile(image, pixel);
+        let why = why.ok_or_else(|| {
+            not_found(format!(
+                "the pixel {x},{y} is not rendered in job {}",
+                image.job
+            ))
+        })?;
+        // People know workers by their names.
+        Ok(match why {
+            sched::WhyTile::Leased {
+                worker,
+                second: None,
+            } => format!("worker {} renders it", self.worker_name(worker)),
+            sched::WhyTile::Leased {
+                worker,
+                second: Some(second),
+            } => format!(
+                "workers {} and {} render it, the first result wins",
+                self.worker_name(worker),
+                self.worker_name(second)
+            ),
+            why => why.to_string(),
+        })
     }
 
     fn snapshot(&self, id: JobId) -> Result<Snapshot, Failure> {
@@ -146,24 +187,30 @@ impl Shell {
         }
     }
 
-    fn bytes(&self, digest: Digest, wanted: Wanted) -> Result<PathBuf, Failure> {
-        let mut scenes = self.jobs.iter().map(|(_, job)| &job.scene);
-        let path = scenes.find_map(|scene| match wanted {
-            Wanted::Scene => scene.scene(digest),
-            Wanted::Asset => scene.asset(digest),
-        });
+    /// Where bytes are, once for each job that has them: those of a cancelled job are on their way out.
+    fn bytes(&self, digest: Digest, wanted: Wanted) -> Result<Vec<PathBuf>, Failure> {
+        let scenes = self.jobs.iter().map(|(_, job)| &job.scene);
+        let paths: Vec<_> = scenes
+            .filter_map(|scene| match wanted {
+                Wanted::Scene => scene.scene(digest),
+                Wanted::Asset => scene.asset(digest),
+            })
+            .collect();
         let what = match wanted {
             Wanted::Scene => "scene",
             Wanted::Asset => "asset",
         };
-        path.ok_or_else(|| not_found(format!("no job has the {what} {digest}")))
+        match paths.is_empty() {
+            true => Err(not_found(format!("no job has the {what} {digest}"))),
+            false => Ok(paths),
+        }
     }
 
     fn info(&self) -> proto::FarmInfo {
-        let connected = self
-            .workers
-            .values()
-            .filter(|worker| worker.control.is_some());
+        let views = || self.sched.workers();
+        let connected = || views().filter(|view| view.link == sched::Link::Open);
+        let running = self.sched.jobs();
+        let running = running.filter(|job| job.state == sched::JobState::Running);
         let count = |count: usize| u32::try_from(count).unwrap_or(u32::MAX);
         proto::FarmInfo {
             build: self.config.build.clone(),
@@ -173,7 +220,18 @@ impl Shell {
             epoch: self.state.epoch().0,
             started_unix_ms: unix_ms(self.clock.started()),
             jobs: count(self.jobs.len()),
-            workers_connected: count(connected.count()),
+            workers_connected: count(connected().count()),
+            jobs_running: count(running.count()),
+            threads: connected().map(|view| view.threads).sum(),
+            attempts_live: views().map(|view| view.attempts).sum(),
+            workers_aside: count(connected().filter(|view| view.aside.is_some()).count()),
+            incidents: self.sched.jobs().map(|job| job.incidents).sum(),
+            now_unix_ms: self.unix_ms_now(),
+            state: self.state.root().display().to_string(),
+            // The disk is asked by who has the time.
+            disk_free_bytes: None,
+            disk_bytes: None,
+            trouble: self.troubles.values().next().cloned().unwrap_or_default(),
         }
     }
 }

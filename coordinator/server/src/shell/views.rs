@@ -1,6 +1,6 @@
 //! What users are shown, from the scheduler's views and the loop's own tables.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use model::{ImageNumber, ImageRef, JobId};
 use sched::{ImageFailure, ImageView, JobOutcome, JobView, Sched, WorkerView};
@@ -9,13 +9,21 @@ use wire::proto::{self, ErrorKind};
 
 use crate::clock::unix_ms;
 use crate::job::Job;
-use crate::worker::Worker;
+use crate::worker::{Draining, Worker};
 
 /// The answer to a question about a job that is not there.
 pub(super) fn no_job(job: JobId) -> Failure {
     Failure::new(
         ErrorKind::NotFound,
         format!("there is no job {job}; `flyby job list` shows those there are"),
+    )
+}
+
+/// The answer to a question about a worker that is not there.
+pub(super) fn no_worker(name: &str) -> Failure {
+    Failure::new(
+        ErrorKind::NotFound,
+        format!("there is no worker `{name}`; `flyby worker list` shows those there are"),
     )
 }
 
@@ -72,7 +80,23 @@ pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
         revision: view.revision.0,
         paused: view.paused == sched::Paused::Yes,
         priority: view.priority,
+        share: view.share,
+        needs: needs(view.needs),
+        after: view.after.iter().map(|job| job.0).collect(),
+        focus: view.focus.map(Into::into),
+        blocks_twice: view.blocks_twice,
+        incidents: view.incidents,
     }
+}
+
+/// What a job asks of workers, if it asks for anything.
+fn needs(needs: &sched::Needs) -> Option<proto::Needs> {
+    let asks = *needs != sched::Needs::default();
+    asks.then(|| proto::Needs {
+        labels: needs.labels.iter().cloned().collect(),
+        threads: needs.threads,
+        memory_bytes: needs.memory_bytes,
+    })
 }
 
 /// Whether nothing of a job will change any more.
@@ -166,6 +190,8 @@ pub(super) fn worker_status(view: &WorkerView, known: Option<&Worker>) -> proto:
         build: String::new(),
         simd_level: String::new(),
         memory_bytes: 0,
+        labels: BTreeSet::new(),
+        time_left: None,
     });
     proto::WorkerStatus {
         worker: Some(view.worker.into()),
@@ -181,5 +207,11 @@ pub(super) fn worker_status(view: &WorkerView, known: Option<&Worker>) -> proto:
         credit: view.credit,
         render_us: view.render_time.0,
         revision: view.revision.0,
+        labels: about.labels.into_iter().collect(),
+        runs_until_unix_ms: known
+            .and_then(|worker| worker.runs_until)
+            .map_or(0, unix_ms),
+        aside_until_unix_ms: view.aside.map_or(0, unix_ms),
+        draining: known.is_some_and(|worker| worker.draining == Draining::Yes),
     }
 }

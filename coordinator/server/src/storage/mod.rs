@@ -30,7 +30,7 @@ use tokio::sync::mpsc;
 use self::disk::{Disk, Stopping};
 use self::writer::Writer;
 use crate::inbox::Upload;
-use crate::input::{Arrived, News};
+use crate::input::{Arrived, Frames, News};
 use crate::job::Counters;
 use crate::state::JobFolders;
 
@@ -48,7 +48,7 @@ enum Order {
     Record(Entry, Option<Ticket>),
     Encode(Arc<Plan>, ImageRef, Counters, Era),
     Drop(ImageRef),
-    Forget(JobFolders),
+    Forget(JobFolders, Frames),
 }
 
 /// How often what there was of an image became void: dropped, finished, or begun again.
@@ -147,9 +147,9 @@ impl Storage {
         self.order(Order::Drop(image));
     }
 
-    /// Removes all of a job but its frames.
-    pub(crate) fn forget(&self, folders: JobFolders) {
-        self.order(Order::Forget(folders));
+    /// Removes all of a job; its frames only where they are to go.
+    pub(crate) fn forget(&self, folders: JobFolders, frames: Frames) {
+        self.order(Order::Forget(folders, frames));
     }
 
     fn order(&self, order: Order) {

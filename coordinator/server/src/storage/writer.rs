@@ -227,8 +227,8 @@ impl Writer {
                     tracing::warn!("{}", chain(&error));
                 }
             }
-            Order::Forget(folders) => {
-                if let Err(error) = folders.forget() {
+            Order::Forget(folders, frames) => {
+                if let Err(error) = folders.forget(frames) {
                     tracing::warn!("{}", chain(&error));
                 }
             }

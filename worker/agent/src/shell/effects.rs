@@ -105,6 +105,11 @@ impl Shell {
             name: self.config.name.clone(),
             worker: Some(self.worker.into()),
             held: held.into_iter().map(Into::into).collect(),
+            labels: self.config.labels.clone(),
+            time_left_ms: self.time_left().map(|left| {
+                // The wire counts milliseconds; part of one is none.
+                u64::try_from(left.as_millis()).unwrap_or(u64::MAX)
+            }),
         };
         if let (Some(link), Some(clients)) = (&mut self.link, self.clients.take()) {
             link.greet(clients, hello, self.blocks_max, self.inputs.clone());

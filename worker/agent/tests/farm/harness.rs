@@ -300,7 +300,7 @@ impl Submission {
                 proto::FrameFormat::Png8.into(),
             ],
             settings_json: "{}".to_owned(),
-            min_tile_pixels: 0,
+            ..proto::SubmitHead::default()
         };
         Self {
             head,
