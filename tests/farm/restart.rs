@@ -52,6 +52,21 @@ fn after_ctrl_c() {
 }
 
 #[test]
+fn a_worker_keeps_the_tile_that_it_had_begun() {
+    let mut farm = Farm::of_workers(1);
+    // Each image is one tile.
+    let job = farm.submit(&slow().with(&[FLYBY, "--tile", "200x150"]));
+    farm.wait_acknowledged(job, 3);
+    farm.coordinator.kill();
+    farm.start_again();
+    goes_on(&farm, job, 3);
+    let log = farm.flyby(["job", "log", &job.to_string()]).ok();
+    assert!(log.contains("goes on with a tile"), "{log}");
+    // It was not leased anew.
+    assert_eq!(log.matches("frame 0 is begun").count(), 1, "{log}");
+}
+
+#[test]
 fn killed_again_and_again() {
     let (mut farm, job) = at_work();
     let mut done = 0;

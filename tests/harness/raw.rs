@@ -226,12 +226,9 @@ pub(crate) fn worker(id: u64) -> Hello {
         build: "test".into(),
         simd_level: "scalar".into(),
         threads: 1,
-        memory_bytes: 0,
         name: format!("raw{id}"),
         worker: Some(WorkerIdentity { id, incarnation: 1 }),
-        held: Vec::new(),
-        labels: Vec::new(),
-        time_left_ms: None,
+        ..Hello::default()
     }
 }
 

@@ -160,7 +160,7 @@ impl Coordinator {
     pub(crate) fn hears(&mut self, now: Timestamp, worker: WorkerId, link: u64, message: Up) {
         self.witness.hears_of(worker, now);
         let event = match message {
-            Up::Hello(held) => Event::WorkerJoined {
+            Up::Hello(held, begun) => Event::WorkerJoined {
                 worker,
                 link: LinkId(link),
                 offer: Offer {
@@ -171,6 +171,7 @@ impl Coordinator {
                     time_left: None,
                 },
                 held,
+                begun,
             },
             Up::Credit(credit) => Event::Credit { worker, credit },
             Up::Heartbeat(running) => Event::Heartbeat { worker, running },
@@ -573,6 +574,11 @@ impl Coordinator {
                 self.witness.leases(worker, &lease);
                 (worker, Down::Lease(lease))
             }
+            Effect::Adopted {
+                worker,
+                attempt,
+                image,
+            } => return self.witness.adopts(worker, attempt, image),
             Effect::Revoke {
                 worker, attempt, ..
             } => (worker, Down::Revoke(attempt)),

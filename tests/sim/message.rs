@@ -1,6 +1,6 @@
 //! What passes between a worker and the coordinator.
 
-use model::{AttemptId, Lease, Rect, Running, Span};
+use model::{AttemptId, Begun, Lease, Rect, Running, Span};
 use sched::BlockRef;
 use session::{BlockVerdict, Retry, Welcome};
 
@@ -9,7 +9,7 @@ use crate::disk::Pixels;
 /// What workers send.
 #[derive(Clone, Debug)]
 pub(crate) enum Up {
-    Hello(Vec<AttemptId>),
+    Hello(Vec<AttemptId>, Vec<Begun>),
     Credit(u32),
     Heartbeat(Vec<Running>),
     Failed(AttemptId, String),

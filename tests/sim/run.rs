@@ -19,6 +19,8 @@ pub(crate) struct Report {
     pub(crate) incidents: u64,
     /// Starts of coordinators after a crash.
     pub(crate) restarts: u64,
+    /// Tiles that workers went on with after one.
+    pub(crate) adopted: u64,
 }
 
 /// Runs one farm; what broke where something did.
@@ -31,6 +33,7 @@ pub(crate) fn one(plan: Plan) -> Result<Report, String> {
             events: farm.events(),
             incidents: farm.coordinator.witness.incidents,
             restarts: farm.coordinator.restarts(),
+            adopted: farm.coordinator.witness.adopted,
         }
     };
     catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
@@ -98,5 +101,6 @@ impl Report {
         self.events += other.events;
         self.incidents += other.incidents;
         self.restarts += other.restarts;
+        self.adopted += other.adopted;
     }
 }

@@ -22,6 +22,8 @@ pub(crate) struct Witness {
     pub(crate) encoded: BTreeSet<ImageRef>,
     /// Blocks of which two renderings differed.
     pub(crate) incidents: u64,
+    /// Tiles that workers went on with after a crash.
+    pub(crate) adopted: u64,
     /// Pixels that were acknowledged and still count.
     pixels: BTreeMap<ImageRef, Vec<bool>>,
     /// Every lease of this epoch.
@@ -46,6 +48,12 @@ impl Witness {
                 assert!(is_new, "what is acknowledged is never rendered again");
             }
         }
+    }
+
+    /// A worker goes on with what another epoch had leased it.
+    pub(crate) fn adopts(&mut self, worker: WorkerId, attempt: AttemptId, image: ImageRef) {
+        self.leased.insert(attempt, (worker, image));
+        self.adopted += 1;
     }
 
     pub(crate) fn image_of(&self, attempt: AttemptId) -> Option<ImageRef> {
@@ -94,7 +102,7 @@ impl Witness {
         }
     }
 
-    /// Attempts of another epoch are dead, and what they were leased is of no interest.
+    /// Attempts of another epoch are dead until they are taken up, and what they were leased is of no interest.
     pub(crate) fn crash(&mut self) {
         self.leased.clear();
     }

@@ -150,7 +150,7 @@ impl Worker {
         let message = match effect {
             Effect::Connect => return self.wishes.push(Wish::Dial),
             Effect::CloseLink => return self.wishes.push(Wish::Close),
-            Effect::SendHello { held } => Up::Hello(held),
+            Effect::SendHello { held, begun } => Up::Hello(held, begun),
             Effect::SendCredit { credit } => Up::Credit(credit),
             Effect::SendHeartbeat { running } => Up::Heartbeat(running),
             Effect::StartTile { lease } => {

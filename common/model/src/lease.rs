@@ -31,6 +31,17 @@ impl Lease {
     }
 }
 
+/// A tile that a worker has begun, as it tells a coordinator that may not know of it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Begun {
+    /// The attempt, of whichever epoch.
+    pub attempt: AttemptId,
+    /// Its image.
+    pub image: ImageRef,
+    /// Its pixels.
+    pub tile: Rect,
+}
+
 /// How far a worker is with a tile that it has started.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub struct Running {

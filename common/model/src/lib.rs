@@ -18,6 +18,6 @@ pub mod time;
 pub use digest::Digest;
 pub use frames::FrameRange;
 pub use ids::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Revision, SubmissionId, WorkerId};
-pub use lease::{Lease, Running};
+pub use lease::{Begun, Lease, Running};
 pub use rect::{Rect, Resolution};
 pub use time::{Span, Timestamp};

@@ -5,8 +5,8 @@
 
 use model::rect::SIDE_MAX;
 use model::{
-    AttemptId, Digest, Epoch, FrameRange, ImageNumber, ImageRef, JobId, Lease, Rect, Running, Span,
-    SubmissionId, WorkerId,
+    AttemptId, Begun, Digest, Epoch, FrameRange, ImageNumber, ImageRef, JobId, Lease, Rect,
+    Running, Span, SubmissionId, WorkerId,
 };
 
 use crate::proto;
@@ -281,6 +281,32 @@ impl TryFrom<proto::Lease> for Lease {
             tile: require(lease.tile, "lease.tile")?.try_into()?,
             wanted: list(lease.blocks, "lease.blocks", WANTED_MAX)?,
             expected: Span(lease.expected_us),
+        })
+    }
+}
+
+impl From<Begun> for proto::Begun {
+    fn from(begun: Begun) -> Self {
+        Self {
+            attempt: Some(begun.attempt.into()),
+            job: begun.image.job.0,
+            image: begun.image.image.0,
+            tile: Some(begun.tile.into()),
+        }
+    }
+}
+
+impl TryFrom<proto::Begun> for Begun {
+    type Error = BadMessage;
+
+    fn try_from(begun: proto::Begun) -> Result<Self, BadMessage> {
+        Ok(Self {
+            attempt: require(begun.attempt, "begun.attempt")?.try_into()?,
+            image: ImageRef {
+                job: JobId(begun.job),
+                image: ImageNumber(begun.image),
+            },
+            tile: require(begun.tile, "begun.tile")?.try_into()?,
         })
     }
 }

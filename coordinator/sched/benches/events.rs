@@ -114,6 +114,7 @@ fn farm(tiles: TileShape, count: u64) -> Farm {
                 time_left: None,
             },
             held: Vec::new(),
+            begun: Vec::new(),
         });
     }
     for id in 0..WORKERS {

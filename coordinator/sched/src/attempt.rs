@@ -4,7 +4,7 @@ use alloc::vec;
 use alloc::vec::Vec;
 
 use model::rect::GRID_SQUARE;
-use model::{ImageRef, Rect, Span, Timestamp};
+use model::{AttemptId, ImageRef, Rect, Span, Timestamp};
 
 use crate::roster::Place;
 use crate::timers::Alarm;
@@ -12,6 +12,8 @@ use crate::timers::Alarm;
 /// A live attempt; it is removed when it ends.
 #[derive(Clone, Debug)]
 pub(crate) struct Attempt {
+    /// What its worker calls it, where that is not its number in this epoch.
+    pub(crate) name: Option<AttemptId>,
     pub(crate) worker: Place,
     pub(crate) image: ImageRef,
     /// Number of the tile in its image.
@@ -71,6 +73,7 @@ impl Attempt {
     pub(crate) fn new(start: Start) -> Self {
         let (columns, rows) = squares(start.rect);
         Self {
+            name: None,
             worker: start.worker,
             image: start.image,
             tile: start.tile,
@@ -110,6 +113,17 @@ impl Attempt {
 
     /// Notes that a block of the tile arrived; says whether it is the first time.
     pub(crate) fn arrives(&mut self, block: Rect) -> bool {
+        let first = self.note(block);
+        self.delivered += u32::from(first);
+        first
+    }
+
+    /// Notes that a block of the tile had arrived before the attempt was taken up: it may be sent again.
+    pub(crate) fn had_arrived(&mut self, block: Rect) {
+        self.note(block);
+    }
+
+    fn note(&mut self, block: Rect) -> bool {
         let column = (block.x0 / GRID_SQUARE - self.rect.x0 / GRID_SQUARE) as usize;
         let row = (block.y0 / GRID_SQUARE - self.rect.y0 / GRID_SQUARE) as usize;
         let index = row * squares(self.rect).0 + column;
@@ -120,7 +134,6 @@ impl Attempt {
         };
         let first = *word & bit == 0;
         *word |= bit;
-        self.delivered += u32::from(first);
         first
     }
 

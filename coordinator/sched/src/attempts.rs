@@ -15,6 +15,9 @@ impl Sched {
     pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Attempt> {
         let mut attempt = self.attempts.remove(number)?;
         self.timers.remove(Timer::Stuck(number), &mut attempt.stuck);
+        if let Some(name) = attempt.name {
+            self.adopted.remove(&name);
+        }
         let worker = &mut self.workers[attempt.worker];
         if let Ok(index) = worker.live.binary_search(&number) {
             worker.live.remove(index);

@@ -81,7 +81,10 @@ impl Sched {
         job.tally.pixels_done += new;
         job.tally.blocks_done += u64::from(new > 0);
         job.tally.started.get_or_insert(self.now);
-        if attempt.epoch != self.config.epoch && new > 0 {
+        // What an attempt delivered that nobody knows any more counts all the same.
+        let is_recalled =
+            attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
+        if is_recalled && new > 0 {
             job.recall_block(rect, elapsed);
         }
         out.push(ack);

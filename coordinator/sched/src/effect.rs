@@ -43,6 +43,15 @@ pub enum Effect {
         /// Of the attempts that it said it holds, those that are live: it drops the others.
         live: Vec<AttemptId>,
     },
+    /// A worker goes on with a tile that it had begun in an earlier epoch.
+    Adopted {
+        /// The worker.
+        worker: WorkerId,
+        /// The attempt, which keeps its name.
+        attempt: AttemptId,
+        /// Its image.
+        image: ImageRef,
+    },
     /// Tell a worker that it is not taken, and close the link.
     WorkerRefused {
         /// The worker.

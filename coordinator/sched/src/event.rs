@@ -4,8 +4,8 @@ use alloc::string::String;
 use alloc::vec::Vec;
 
 use model::{
-    AttemptId, Digest, FrameRange, ImageRef, JobId, Rect, Revision, Running, Span, SubmissionId,
-    WorkerId,
+    AttemptId, Begun, Digest, FrameRange, ImageRef, JobId, Rect, Revision, Running, Span,
+    SubmissionId, WorkerId,
 };
 
 use crate::{Command, Needs, Offer};
@@ -92,6 +92,8 @@ pub enum Event {
         offer: Offer,
         /// The attempts that it still has from before a broken link.
         held: Vec<AttemptId>,
+        /// Of those of earlier epochs, the tiles that it has begun: they are taken up where nobody else has them.
+        begun: Vec<Begun>,
     },
     /// How many tiles a worker wants to hold in all, running and ahead (thesis C.3.5).
     Credit {

@@ -167,6 +167,12 @@ impl Sched {
             timers += self.timers.check(Timer::Waiting(place), worker.waiting);
             timers += self.timers.check(Timer::LetBack(place), worker.aside.alarm);
         }
+        for (&name, &number) in &self.adopted {
+            assert!(name.epoch < self.config.epoch);
+            assert_eq!(self.attempts[number].name, Some(name));
+        }
+        let named = self.attempts.iter().filter(|(_, live)| live.name.is_some());
+        assert_eq!(named.count(), self.adopted.len());
         assert_eq!(capacity, self.capacity);
         assert_eq!(
             live,

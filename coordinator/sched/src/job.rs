@@ -225,7 +225,7 @@ impl Job {
         self.work.entry(place).or_insert(work)
     }
 
-    fn may_begin(&self, config: &Config) -> bool {
+    pub(crate) fn may_begin(&self, config: &Config) -> bool {
         let in_flight = self.counts.rendering + self.counts.encoding;
         self.waiting.count() > 0 && in_flight < config.images_in_flight_max.max(1)
     }

@@ -158,14 +158,26 @@ impl Sched {
         tile.is_some()
     }
 
-    /// Begins an attempt at a tile that has room for one.
+    /// Leases a tile that has room for an attempt.
     pub(crate) fn lease_tile(
+        &mut self,
+        place: Place,
+        tile: (ImageRef, u32),
+        purpose: Purpose,
+        out: &mut Vec<Effect>,
+    ) {
+        let lease = self.begin_attempt(place, tile, purpose);
+        let worker = self.workers[place].id;
+        out.push(Effect::Lease { worker, lease });
+    }
+
+    /// Begins an attempt at a tile that has room for one; what its worker should know of it.
+    pub(crate) fn begin_attempt(
         &mut self,
         place: Place,
         (image, number): (ImageRef, u32),
         purpose: Purpose,
-        out: &mut Vec<Effect>,
-    ) {
+    ) -> Lease {
         self.attempts_made += 1;
         let attempt = self.attempts_made;
         let worker = &mut self.workers[place];
@@ -243,12 +255,11 @@ impl Sched {
         worker.idle += 1;
         worker.backlog = worker.backlog.saturating_add(cost.unwrap_or(0));
         worker.patience = limit;
-        let id = worker.id;
         if worker.waiting.due().is_none() {
             self.rearm_waiting(place);
         }
         self.worker_changed(place);
         self.reconsider(image, number);
-        out.push(Effect::Lease { worker: id, lease });
+        lease
     }
 }

@@ -16,6 +16,7 @@
 
 extern crate alloc;
 
+mod adopt;
 mod aside;
 mod attempt;
 mod attempts;

@@ -3,7 +3,7 @@
 use alloc::format;
 use alloc::vec::Vec;
 
-use model::{AttemptId, Running, Span, WorkerId};
+use model::{AttemptId, Begun, Running, Span, WorkerId};
 
 use crate::attempt::Phase;
 use crate::needs::Comes;
@@ -17,7 +17,7 @@ impl Sched {
         &mut self,
         id: WorkerId,
         (link, offer): (LinkId, Offer),
-        held: &[AttemptId],
+        (held, begun): (&[AttemptId], &[Begun]),
         out: &mut Vec<Effect>,
     ) {
         let known = self.workers.place(id);
@@ -52,7 +52,20 @@ impl Sched {
             .filter(|&attempt| self.owned(id, attempt).is_some())
             .collect();
         self.keep_only(place, &live);
-        out.push(Effect::Welcome { worker: id, live });
+        let adopted = self.adopt(place, begun, out);
+        let images = adopted.iter().map(|begun| (begun.attempt, begun.image));
+        let live = live
+            .into_iter()
+            .chain(adopted.iter().map(|begun| begun.attempt));
+        out.push(Effect::Welcome {
+            worker: id,
+            live: live.collect(),
+        });
+        out.extend(images.map(|(attempt, image)| Effect::Adopted {
+            worker: id,
+            attempt,
+            image,
+        }));
         self.worker_changed(place);
     }
 
@@ -90,7 +103,9 @@ impl Sched {
     /// Ends a worker's attempts that it does not have (their lease was lost on the
     /// way), and takes up the others where they are.
     fn keep_only(&mut self, place: Place, held: &[AttemptId]) {
-        let held: alloc::collections::BTreeSet<u64> = held.iter().map(|id| id.number).collect();
+        let worker = self.workers[place].id;
+        let held = held.iter().filter_map(|&id| self.owned(worker, id));
+        let held: alloc::collections::BTreeSet<u64> = held.collect();
         for number in self.workers[place].live.clone() {
             if !held.contains(&number) {
                 self.end_attempt(number);

@@ -56,6 +56,26 @@ impl Region {
         Some((first, second))
     }
 
+    /// The region of these pixels; `None` where there is none of exactly them.
+    pub(crate) fn at(rect: Rect, grid: TileGrid) -> Option<Self> {
+        let mut region = Self::whole(grid);
+        loop {
+            let there = region.rect(grid);
+            if there == rect {
+                return Some(region);
+            }
+            let (first, second) = region.split()?;
+            region = [first, second]
+                .into_iter()
+                .find(|half| half.rect(grid).contains(rect))?;
+        }
+    }
+
+    /// Whether all of another region is part of it.
+    pub(crate) fn contains(self, other: Self) -> bool {
+        self.x0 <= other.x0 && other.x1 <= self.x1 && self.y0 <= other.y0 && other.y1 <= self.y1
+    }
+
     /// Its pixels.
     pub(crate) fn rect(self, grid: TileGrid) -> Rect {
         grid.span((self.x0, self.y0), (self.x1, self.y1))
@@ -90,6 +110,7 @@ mod tests {
             let mut left = alloc::vec![Region::whole(grid)];
             while let Some(region) = left.pop() {
                 nodes.push(region.node);
+                assert_eq!(Region::at(region.rect(grid), grid), Some(region));
                 match region.split() {
                     Some((first, second)) => {
                         assert_eq!(first.cells() + second.cells(), region.cells());

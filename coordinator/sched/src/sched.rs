@@ -42,6 +42,8 @@ pub struct Sched {
     /// Live attempts by number.
     pub(crate) attempts: Live,
     pub(crate) attempts_made: u64,
+    /// The numbers of live attempts that were leased in earlier epochs, by the names that they keep.
+    pub(crate) adopted: BTreeMap<AttemptId, u64>,
     pub(crate) timers: Timers,
     pub(crate) market: Market,
     /// When it is worth looking again for help that jobs near their end could have.
@@ -67,6 +69,7 @@ impl Sched {
             capacity: 0,
             attempts: Live::default(),
             attempts_made: 0,
+            adopted: BTreeMap::new(),
             timers: Timers::default(),
             market: Market::default(),
             help_next: Timestamp::default(),
@@ -107,7 +110,8 @@ impl Sched {
                 link,
                 offer,
                 held,
-            } => self.worker_joined(worker, (link, offer), &held, out),
+                begun,
+            } => self.worker_joined(worker, (link, offer), (&held, &begun), out),
             Event::Credit { worker, credit } => self.credit(worker, credit),
             Event::Heartbeat { worker, running } => self.heartbeat(worker, &running, out),
             Event::GivenBack { worker, attempts } => self.given_back(worker, &attempts),
@@ -208,23 +212,32 @@ impl Sched {
         Some((worker, attempt.image, attempt.rect))
     }
 
-    /// A live attempt; one of another epoch never is.
+    /// A live attempt; one of another epoch is only where it was taken up again.
     pub(crate) fn live(&self, attempt: AttemptId) -> Option<&Attempt> {
-        (attempt.epoch == self.config.epoch)
-            .then(|| self.attempts.get(attempt.number))
-            .flatten()
+        self.attempts.get(self.number(attempt)?)
+    }
+
+    /// The number of an attempt, which may have ended, in this epoch.
+    fn number(&self, attempt: AttemptId) -> Option<u64> {
+        match attempt.epoch == self.config.epoch {
+            true => Some(attempt.number),
+            false => self.adopted.get(&attempt).copied(),
+        }
     }
 
     /// The number of a live attempt, if it is this worker's.
     pub(crate) fn owned(&self, worker: WorkerId, attempt: AttemptId) -> Option<u64> {
-        let live = self.live(attempt)?;
-        (self.workers[live.worker].id == worker).then_some(attempt.number)
+        let number = self.number(attempt)?;
+        let live = self.attempts.get(number)?;
+        (self.workers[live.worker].id == worker).then_some(number)
     }
 
+    /// What its worker calls an attempt.
     pub(crate) fn attempt_id(&self, number: u64) -> AttemptId {
-        AttemptId {
+        let name = self.attempts.get(number).and_then(|attempt| attempt.name);
+        name.unwrap_or(AttemptId {
             epoch: self.config.epoch,
             number,
-        }
+        })
     }
 }

@@ -79,6 +79,18 @@ impl Trouble {
         }
     }
 
+    /// Adds what went wrong with other pixels.
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.failures = self.failures.max(other.failures);
+        self.losses = self.losses.max(other.losses);
+        self.on_purpose |= other.on_purpose;
+        for worker in &other.failed_on {
+            if !self.failed_on.contains(worker) {
+                self.failed_on.push(*worker);
+            }
+        }
+    }
+
     /// Whether a worker should be given these pixels, of `able` workers that there are: one that
     /// failed at them comes last.
     pub(crate) fn suits(&self, worker: WorkerId, able: u32) -> bool {

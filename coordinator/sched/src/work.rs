@@ -163,6 +163,68 @@ impl Work {
         None
     }
 
+    /// Makes a tile of these pixels for an attempt that is there already; `None` where they are no tile's that could
+    /// have been cut, are in another tile, or are all durable.
+    pub(crate) fn claim(&mut self, rect: Rect) -> Option<u32> {
+        let region = Region::at(rect, self.grid).filter(|_| !self.given_up)?;
+        let is_free = |cell: usize| self.cells[cell] == NO_TILE;
+        let missing = self.missing(rect);
+        if missing == 0 || !region.indices(self.grid).all(is_free) {
+            return None;
+        }
+        let trouble = self.take_out(region);
+        let tile = self.tiles.insert(Tile::new(region, rect, missing, trouble));
+        self.mark(region, tile);
+        Some(tile)
+    }
+
+    /// Takes a region that no tile holds out of the pieces; what went wrong in it.
+    fn take_out(&mut self, region: Region) -> Trouble {
+        let touches =
+            |piece: &Piece| piece.region.contains(region) || region.contains(piece.region);
+        let plain = self.pieces.iter().filter(|(_, piece)| touches(piece));
+        let plain: Vec<Order> = plain.map(|(&order, _)| order).collect();
+        let mut touched: Vec<Piece> = plain
+            .iter()
+            .filter_map(|order| self.pieces.remove(order))
+            .collect();
+        let (troubled, others) = core::mem::take(&mut self.troubled)
+            .into_iter()
+            .partition::<VecDeque<_>, _>(touches);
+        self.troubled = others;
+        touched.extend(troubled);
+        let mut trouble = Trouble::default();
+        for mut piece in touched {
+            let amount = self.amount(piece.region);
+            self.open.pixels -= amount.pixels;
+            self.open.cost -= amount.cost;
+            trouble.add(&piece.trouble);
+            // What of it lies outside waits on.
+            while piece.region != region && piece.region.contains(region) {
+                let Some((first, second)) = piece.region.split() else {
+                    break;
+                };
+                let (inside, outside) = match first.contains(region) {
+                    true => (first, second),
+                    false => (second, first),
+                };
+                self.put(Piece {
+                    region: outside,
+                    trouble: piece.trouble.clone(),
+                });
+                piece.region = inside;
+            }
+        }
+        trouble
+    }
+
+    /// Live attempts at tiles that hold any of these pixels.
+    pub(crate) fn attempts_in(&self, rect: Rect) -> Vec<u64> {
+        let tiles = self.tiles.iter().map(|(_, tile)| tile);
+        let touched = tiles.filter(|tile| tile.rect.intersection(rect).is_some());
+        touched.flat_map(Tile::attempts).collect()
+    }
+
     fn shared_for(&self, ask: &Ask) -> Option<u32> {
         let fits = |&&tile: &&u32| {
             let tile = self.tiles.get(tile);

@@ -499,6 +499,7 @@ impl History {
                 time_left: (id == 1).then_some(Span::from_secs(40)),
             },
             held: held.map(|(&attempt, _)| attempt).collect(),
+            begun: Vec::new(),
         });
     }
 

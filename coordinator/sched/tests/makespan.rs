@@ -291,6 +291,7 @@ fn makespan(
                 time_left: None,
             },
             held: Vec::new(),
+            begun: Vec::new(),
         });
         farm.tell(Event::Credit {
             worker: id(worker),

@@ -18,6 +18,7 @@ fn joins_with(farm: &mut Farm, id: u64, offer: Offer) {
         link: LinkId(id),
         offer,
         held: vec![],
+        begun: vec![],
     })
     .wants_tiles(id, 4);
 }
@@ -136,6 +137,7 @@ fn kinds_of_job_and_labels_have_limits() {
             link: LinkId(1),
             offer,
             held: vec![],
+            begun: vec![],
         })
         .wants(&[Effect::WorkerRefused {
             worker: worker(1),

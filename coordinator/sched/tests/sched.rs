@@ -231,6 +231,7 @@ fn leases_go_to_workers_of_the_pinned_revision() {
                 ..offer()
             },
             held: vec![],
+            begun: vec![],
         })
         .wants_tiles(1, 5);
     assert_eq!(farm.never_mind().last(), Some(&welcome(1, &[])));
@@ -313,6 +314,7 @@ fn a_late_word_of_an_old_link_changes_nothing() {
         link: LinkId(1),
         offer: offer(),
         held: vec![],
+        begun: vec![],
     })
     .wants(&[]);
 }

@@ -160,6 +160,7 @@ fn workers_that_are_away_near_their_end_or_of_no_use() {
             link: LinkId(id + 10),
             offer,
             held: vec![],
+            begun: vec![],
         })
         .wants_tiles(id, 1);
     }

@@ -179,6 +179,7 @@ pub(crate) struct Greeting {
     pub(crate) revision: Revision,
     pub(crate) threads: u32,
     pub(crate) held: Vec<model::AttemptId>,
+    pub(crate) begun: Vec<model::Begun>,
     pub(crate) about: AboutWorker,
 }
 

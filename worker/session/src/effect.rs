@@ -3,7 +3,7 @@
 use alloc::string::String;
 use alloc::vec::Vec;
 
-use model::{AttemptId, Lease, Rect, Running};
+use model::{AttemptId, Begun, Lease, Rect, Running};
 
 /// Something to do. Effects are performed in order; each may be repeated without harm.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -16,6 +16,8 @@ pub enum Effect {
     SendHello {
         /// In the order in which they were leased.
         held: Vec<AttemptId>,
+        /// The tiles among them that were begun.
+        begun: Vec<Begun>,
     },
     /// Say how many tiles the worker wants to hold in all.
     SendCredit {

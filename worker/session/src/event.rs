@@ -82,7 +82,7 @@ pub enum Event {
 /// The coordinator's answer to a hello.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub struct Welcome {
-    /// Its epoch; what was leased in another one is dead.
+    /// Its epoch; attempts are numbered anew in each.
     pub epoch: Epoch,
     /// How often it wants to hear of the worker.
     pub heartbeat_interval: Span,

@@ -3,7 +3,7 @@
 use alloc::collections::VecDeque;
 use alloc::string::String;
 
-use model::{Lease, Rect, Timestamp};
+use model::{Begun, Lease, Rect, Timestamp};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Held {
@@ -41,6 +41,19 @@ impl Held {
             rendered: 0,
             unacked: VecDeque::new(),
         }
+    }
+
+    /// The tile, if a thread has begun it and has not failed at it.
+    pub(crate) fn begun(&self) -> Option<Begun> {
+        let has_begun = matches!(
+            self.phase,
+            Phase::Running | Phase::Rendered | Phase::Stopped
+        );
+        has_begun.then_some(Begun {
+            attempt: self.lease.attempt,
+            image: self.lease.image,
+            tile: self.lease.tile,
+        })
     }
 
     /// Notes a rendered block; says whether it is new and still wanted.

@@ -5,7 +5,7 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, Running, Span, Timestamp};
 
-use crate::held::Phase;
+use crate::held::{Held, Phase};
 use crate::leave::Leaving;
 use crate::{Effect, ExitReason, LinkState, Retry, Session, Welcome};
 
@@ -83,7 +83,8 @@ impl Session {
         if let Link::Dialling { limit } = self.link {
             self.link = Link::Greeting { limit };
             let held = self.held.keys().copied().collect();
-            out.push(Effect::SendHello { held });
+            let begun = self.held.values().filter_map(Held::begun).collect();
+            out.push(Effect::SendHello { held, begun });
         }
     }
 
@@ -108,8 +109,7 @@ impl Session {
 
     /// Forgets what is dead at the coordinator, and gives back what only lives there.
     fn reconcile(&mut self, welcome: &Welcome, out: &mut Vec<Effect>) {
-        let lives =
-            |attempt: &AttemptId| attempt.epoch == welcome.epoch && welcome.live.contains(attempt);
+        let lives = |attempt: &AttemptId| welcome.live.contains(attempt);
         let held: Vec<AttemptId> = self.held.keys().copied().collect();
         for attempt in held.into_iter().filter(|attempt| !lives(attempt)) {
             self.drop_attempt(attempt, out);

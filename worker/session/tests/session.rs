@@ -16,7 +16,10 @@ fn it_dials_greets_and_says_what_it_wants() {
     .is_told(Event::Started)
     .wants(&[Effect::Connect])
     .is_told(Event::Dialled)
-    .wants(&[Effect::SendHello { held: vec![] }])
+    .wants(&[Effect::SendHello {
+        held: vec![],
+        begun: vec![],
+    }])
     .is_told(welcome(&[]))
     .wants(&[Effect::SendCredit { credit: 3 }])
     .waits(Span::from_millis(1_999))
@@ -197,6 +200,7 @@ fn it_goes_on_without_a_link_and_resends_on_the_next_one() {
         .is_told(Event::Dialled)
         .wants(&[Effect::SendHello {
             held: vec![attempt(1), attempt(2)],
+            begun: vec![begun(1), begun(2)],
         }])
         .is_told(welcome(&[1, 2]))
         .wants(&[
@@ -234,6 +238,29 @@ fn another_epoch_knows_nothing_of_what_is_held() {
         drop_block(1, 0),
     ]);
     assert_eq!(worker.session.summary().waiting, 0);
+}
+
+#[test]
+fn another_epoch_takes_up_what_was_begun_and_nothing_is_rendered_twice() {
+    let mut worker = Situation::connected(config());
+    worker.leased([1, 2]).is_told(rendered(1, 0)).never_mind();
+    worker.is_told(lost()).waits(Span::from_millis(100));
+    worker.is_told(Event::Dialled).wants(&[
+        Effect::Connect,
+        Effect::SendHello {
+            held: vec![attempt(1), attempt(2)],
+            begun: vec![begun(1)],
+        },
+    ]);
+    worker
+        .is_told(welcome_in(Epoch(4), &[1]))
+        .wants(&[Effect::SendCredit { credit: 2 }, send(1, 0)])
+        .is_told(acked(1, 0))
+        .is_told(rendered(1, 1))
+        .is_told(tile_rendered(1))
+        .wants(&[drop_block(1, 0), send(1, 1)])
+        .is_told(acked(1, 1));
+    assert_eq!(worker.session.summary().tiles_delivered, 1);
 }
 
 #[test]

@@ -79,6 +79,7 @@ impl Farm {
             link: LinkId(self.links),
             offer: offer(),
             held: held.iter().copied().map(attempt).collect(),
+            begun: vec![],
         })
     }
 

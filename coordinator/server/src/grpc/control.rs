@@ -111,6 +111,7 @@ fn greeting(hello: proto::Hello, link: Link<proto::ControlDown>) -> Result<Greet
         revision: Revision(hello.revision),
         threads: convert::number(hello.threads, "hello.threads", 1..=4_096)?,
         held: convert::list(hello.held, "hello.held", ATTEMPTS_MAX)?,
+        begun: convert::list(hello.begun, "hello.begun", RUNNING_MAX)?,
         about: AboutWorker {
             name: convert::text(hello.name, "hello.name", 1..=200)?,
             build: convert::text(hello.build, "hello.build", 0..=200)?,

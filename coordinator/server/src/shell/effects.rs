@@ -41,6 +41,18 @@ impl Shell {
                 self.answer_submission(submission, Err(failure));
             }
             Effect::Welcome { worker, live } => self.welcome(worker, live),
+            Effect::Adopted {
+                worker,
+                attempt,
+                image,
+            } => {
+                let name = self.worker_name(worker);
+                tracing::info!(%worker, name, %attempt, job = %image.job, image = %image.image, "a worker goes on with what it had begun");
+                self.say(
+                    image.job,
+                    format!("frame {}: worker {name} goes on with a tile that it had begun before the coordinator was started again", image.image),
+                );
+            }
             Effect::WorkerRefused { worker, refusal } => self.refuse_worker(worker, refusal),
             Effect::Lease { worker, lease } => {
                 let image = lease.image;

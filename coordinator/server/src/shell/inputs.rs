@@ -86,6 +86,7 @@ impl Shell {
             revision,
             threads,
             held,
+            begun,
             about,
         } = greeting;
         tracing::info!(%worker, name = about.name, threads, "a worker says hello");
@@ -100,6 +101,7 @@ impl Shell {
                 time_left: about.time_left,
             },
             held,
+            begun,
         };
         // An older link of the same process is dropped with its streams.
         let draining = self

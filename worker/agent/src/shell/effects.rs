@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use model::{AttemptId, Lease};
+use model::{AttemptId, Begun, Lease};
 use session::{Effect, Event};
 use tokio::sync::{mpsc, watch};
 use wire::failure::Retry;
@@ -25,7 +25,7 @@ impl Shell {
         match effect {
             Effect::Connect => self.connect(),
             Effect::CloseLink => self.close(),
-            Effect::SendHello { held } => self.hello(held),
+            Effect::SendHello { held, begun } => self.hello(held, begun),
             Effect::SendCredit { credit } => {
                 let credit = proto::Credit { tiles: credit };
                 return self.say(control_up::Message::Credit(credit));
@@ -93,7 +93,7 @@ impl Shell {
         self.clients = None;
     }
 
-    fn hello(&mut self, held: Vec<AttemptId>) {
+    fn hello(&mut self, held: Vec<AttemptId>, begun: Vec<Begun>) {
         let hello = proto::Hello {
             protocol_min: wire::version::PROTOCOL_MIN,
             protocol_max: wire::version::PROTOCOL_MAX,
@@ -105,6 +105,7 @@ impl Shell {
             name: self.config.name.clone(),
             worker: Some(self.worker.into()),
             held: held.into_iter().map(Into::into).collect(),
+            begun: begun.into_iter().map(Into::into).collect(),
             labels: self.config.labels.clone(),
             time_left_ms: self.time_left().map(|left| {
                 // The wire counts milliseconds; part of one is none.

@@ -5,7 +5,9 @@
     reason = "each test program uses its own part of the language"
 )]
 
-use model::{AttemptId, Digest, Epoch, ImageNumber, ImageRef, JobId, Lease, Rect, Span, Timestamp};
+use model::{
+    AttemptId, Begun, Digest, Epoch, ImageNumber, ImageRef, JobId, Lease, Rect, Span, Timestamp,
+};
 use session::{Backoff, Config, Effect, Event, Session, Welcome};
 
 pub(crate) const EPOCH: Epoch = Epoch(3);
@@ -140,6 +142,21 @@ pub(crate) fn welcome_in(epoch: Epoch, live: &[u64]) -> Event {
         liveness_limit: LIVENESS,
         live: live.iter().copied().map(attempt).collect(),
     })
+}
+
+/// What it says of a tile that a thread has begun.
+pub(crate) fn begun(number: u64) -> Begun {
+    let Lease {
+        attempt,
+        image,
+        tile,
+        ..
+    } = lease(number);
+    Begun {
+        attempt,
+        image,
+        tile,
+    }
 }
 
 pub(crate) fn lost() -> Event {
