@@ -49,13 +49,19 @@ impl Progress {
 
     /// Says that `done` of the steps are done, and what else is worth knowing.
     pub(crate) fn update(&mut self, done: u64, about: impl Display) {
+        let left = self.seconds_left(done);
+        self.update_with(done, about, left);
+    }
+
+    /// The same, where somebody knows better how long it will take.
+    pub(crate) fn update_with(&mut self, done: u64, about: impl Display, left: Option<Duration>) {
         if self.visible == Visible::Later && self.started.elapsed() >= DELAY {
             self.visible = Visible::Now;
             // Draws nothing where standard error is no terminal.
             self.bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         self.bar.set_position(done);
-        let left = match self.seconds_left(done) {
+        let left = match left {
             Some(left) => format!(", {} left", duration(left)),
             None => String::new(),
         };

@@ -199,7 +199,9 @@ impl Known {
             progress.rate(f64::from(frames)),
             amount(progress.rate(rays.saturating_sub(self.rays_before) as f64)),
         );
-        progress.update(summary.pixels_done, about);
+        let left = summary.left.as_ref();
+        let left = left.map(|left| Duration::from_millis(left.expected_ms));
+        progress.update_with(summary.pixels_done, about, left);
         self.summary = Some(summary);
     }
 

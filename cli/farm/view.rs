@@ -84,6 +84,12 @@ pub(crate) struct Job {
     pub(crate) started_unix_ms: Option<u64>,
     /// When it was over; null until then.
     pub(crate) finished_unix_ms: Option<u64>,
+    /// How long it will still take, as expected; null where nobody can say.
+    pub(crate) left_seconds: Option<f64>,
+    /// It may be as little as this.
+    pub(crate) left_seconds_early: Option<f64>,
+    /// It may be as much as this.
+    pub(crate) left_seconds_late: Option<f64>,
     /// Time spent rendering its blocks, over all threads.
     pub(crate) render_seconds: f64,
     /// Sums over its blocks, by name.
@@ -220,6 +226,9 @@ impl From<proto::JobSummary> for Job {
     fn from(job: proto::JobSummary) -> Self {
         let frames = job.frames.map(FrameRange::try_from);
         let needs = job.needs.clone().unwrap_or_default();
+        let estimate = job.left;
+        let left =
+            |of: fn(&proto::Estimate) -> u64| estimate.as_ref().map(|left| of(left) as f64 / 1e3);
         Self {
             state: match job.state() {
                 JobState::Unspecified | JobState::Running if job.paused => "paused",
@@ -273,6 +282,9 @@ impl From<proto::JobSummary> for Job {
             submitted_unix_ms: job.submitted_unix_ms,
             started_unix_ms: time(job.started_unix_ms),
             finished_unix_ms: time(job.finished_unix_ms),
+            left_seconds: left(|left| left.expected_ms),
+            left_seconds_early: left(|left| left.early_ms),
+            left_seconds_late: left(|left| left.late_ms),
             render_seconds: seconds(job.render_us),
         }
     }
@@ -407,6 +419,7 @@ impl Report for Jobs {
             "done",
             "failed",
             "pixels",
+            "left",
             "submitted",
         ];
         let mut table = columns(header);
@@ -419,6 +432,8 @@ impl Report for Jobs {
                 format!("{}/{}", job.images_done, job.images_total),
                 job.images_failed.to_string(),
                 format!("{} %", job.percent()),
+                job.left_seconds
+                    .map_or_else(String::new, |left| duration(Duration::from_secs_f64(left))),
                 ago(job.submitted_unix_ms),
             ]);
         }
@@ -469,6 +484,19 @@ impl Report for Job {
             )?;
         }
         self.rank(out)?;
+        if let (Some(left), Some(early), Some(late)) = (
+            self.left_seconds,
+            self.left_seconds_early,
+            self.left_seconds_late,
+        ) {
+            writeln!(
+                out,
+                "  left    about {} ({} to {})",
+                duration(Duration::from_secs_f64(left)),
+                duration(Duration::from_secs_f64(early)),
+                duration(Duration::from_secs_f64(late))
+            )?;
+        }
         write!(out, "  time    submitted {}", ago(self.submitted_unix_ms))?;
         if let Some(wall) = self.wall() {
             write!(out, ", took {}", duration(wall))?;

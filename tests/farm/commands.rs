@@ -1,7 +1,7 @@
 //! What users want of jobs that are there: pause, resume, another priority, frames again, an explanation, to be forgotten.
 
 use crate::harness::raw::{self, Raw};
-use crate::harness::scenes::{FLYBY, TINY};
+use crate::harness::scenes::{FLYBY, TINY, slow};
 use crate::harness::{Farm, wait};
 
 fn tiny(farm: &Farm) -> u64 {
@@ -121,6 +121,29 @@ fn a_pixel_and_a_worker_are_asked_why() {
     assert!(said.contains("no tile waits"), "{said}");
     let refused = farm.flyby(["worker", "why", "right"]);
     refused.refused(2, &["there is no worker `right`"]);
+}
+
+#[test]
+fn how_long_a_job_will_take_is_said_on_the_way_and_held_against_the_truth() {
+    let farm = Farm::of_workers(1);
+    let job = farm.submit(&slow().with(&[FLYBY, "--tile", "40x30"]));
+    let shown = farm.wait_until(job, "somebody can say", |job| {
+        !job.0["left_seconds"].is_null()
+    });
+    let left = |name: &str| shown.0[name].as_f64().unwrap();
+    assert!(
+        left("left_seconds_early") <= left("left_seconds"),
+        "{shown:?}"
+    );
+    assert!(
+        left("left_seconds") <= left("left_seconds_late"),
+        "{shown:?}"
+    );
+    let text = farm.flyby(["job", "show", &job.to_string()]).ok();
+    assert!(text.contains("  left    about "), "{text}");
+    assert!(farm.wait_done(job).0["left_seconds"].is_null());
+    let log = farm.flyby(["job", "log", &job.to_string()]).ok();
+    assert!(log.contains("from its first tenth on it took"), "{log}");
 }
 
 #[test]

@@ -85,7 +85,7 @@ impl Sched {
         let is_recalled =
             attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
         if is_recalled && new > 0 {
-            job.recall_block(rect, elapsed);
+            job.recall_block(place, rect, elapsed);
         }
         out.push(ack);
         let arrival = Arrival {
@@ -101,8 +101,7 @@ impl Sched {
             self.tile_done(image, tile, worker, out);
         }
         if image_done && let Some((job, place)) = self.job_and_place(image) {
-            job.work.remove(&place);
-            job.set_state(place, ImageState::Encoding);
+            job.image_is_rendered(place);
             out.push(Effect::Encode { image });
         }
         self.job_changed(image.job);
@@ -158,6 +157,12 @@ impl Sched {
         }
         let cost = cost_of(elapsed, worker.pace.speed());
         job.costs.note(rect, cost);
+        if arrival.new > 0
+            && let Some(index) = job.place(image.image)
+            && let Some(work) = job.work.get_mut(&index)
+        {
+            work.spent = work.spent.saturating_add(cost);
+        }
         let tally = &mut job.tally;
         tally.render_time = Span(tally.render_time.0.saturating_add(elapsed.0));
         if arrival.new == 0 {

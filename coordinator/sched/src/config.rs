@@ -49,8 +49,10 @@ pub struct Config {
     pub unmeasured_needs: Span,
     /// Most tiles of one image, whoever chooses their shape.
     pub max_array_size: u64,
-    /// Images of one job that are rendered or encoded at a time.
+    /// Images of one job that are rendered or encoded at a time, at most…
     pub images_in_flight_max: u32,
+    /// …and at most as many as have so many pixels together, but for the first [`IMAGES_IN_FLIGHT_LEAST`].
+    pub pixels_in_flight_max: u64,
     /// What may be asked for.
     pub limits: Limits,
 }
@@ -97,7 +99,19 @@ pub struct Limits {
     pub label_bytes_max: usize,
 }
 
+/// Images of one job that may be in flight however large they are.
+pub const IMAGES_IN_FLIGHT_LEAST: u32 = 8;
+
 impl Config {
+    /// How many images of so many pixels each may be rendered or encoded at a time: small ones are
+    /// a tile each, and many workers want many of them.
+    pub fn images_in_flight(&self, pixels: u64) -> u32 {
+        let together = self.pixels_in_flight_max / pixels.max(1);
+        let together = u32::try_from(together).unwrap_or(u32::MAX);
+        let most = self.images_in_flight_max.max(1);
+        together.max(IMAGES_IN_FLIGHT_LEAST).min(most)
+    }
+
     /// The farm's usual limits, for a coordinator in its `epoch`.
     pub fn new(epoch: Epoch) -> Self {
         Self {
@@ -121,7 +135,8 @@ impl Config {
             aside: Span::from_secs(300),
             unmeasured_needs: Span::from_secs(30),
             max_array_size: 75_000,
-            images_in_flight_max: 8,
+            images_in_flight_max: 256,
+            pixels_in_flight_max: 1 << 26,
             limits: Limits::default(),
         }
     }

@@ -13,6 +13,7 @@ use crate::market::{Rank, Stage};
 use crate::needs::Kind;
 use crate::pace::time_of;
 use crate::places::Places;
+use crate::spread::Spread;
 use crate::tiling::TileGrid;
 use crate::view::Paused;
 use crate::work::{Amount, Ask, Work};
@@ -46,6 +47,7 @@ pub(crate) struct Job {
     pub(crate) failures: Vec<ImageFailure>,
     pub(crate) tally: Tally,
     pub(crate) costs: Costs,
+    pub(crate) spread: Spread,
     /// Attempts that are their tile's only one, by when they are expected to be done.
     pub(crate) ending: BTreeSet<(Timestamp, u64)>,
     /// Workers that are set aside for it.
@@ -115,6 +117,7 @@ impl Job {
                 ..Tally::default()
             },
             costs: Costs::unknown(spec.window),
+            spread: Spread::default(),
             ending: BTreeSet::new(),
             aside: 0,
             seat: None,
@@ -227,7 +230,7 @@ impl Job {
 
     pub(crate) fn may_begin(&self, config: &Config) -> bool {
         let in_flight = self.counts.rendering + self.counts.encoding;
-        self.waiting.count() > 0 && in_flight < config.images_in_flight_max.max(1)
+        self.waiting.count() > 0 && in_flight < config.images_in_flight(self.spec.window.area())
     }
 
     /// Whether an image may be begun for a worker. Not for one whose time is too short for what there is.

@@ -25,6 +25,7 @@ mod command;
 mod config;
 mod costs;
 mod effect;
+mod estimate;
 mod event;
 mod images;
 mod invariants;
@@ -43,6 +44,7 @@ mod refusal;
 mod region;
 mod roster;
 mod sched;
+mod spread;
 mod tail;
 mod tile;
 mod tiling;
@@ -53,13 +55,14 @@ mod work;
 mod worker;
 
 pub use command::Command;
-pub use config::{Config, Limits, TailGain};
+pub use config::{Config, IMAGES_IN_FLIGHT_LEAST, Limits, TailGain};
 pub use effect::{Effect, JobOutcome, RevokeReason};
 pub use event::{BlockRef, Event, LinkId, Submission, TileShape};
 pub use needs::{Needs, Offer};
 pub use refusal::{BlockRefusal, CommandRefusal, SubmitRefusal, Verdict, WorkerRefusal};
 pub use sched::Sched;
 pub use view::{
-    ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused, WorkerView,
+    Estimate, ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused,
+    WorkerView,
 };
 pub use why::{WhyImage, WhyJob, WhyTile, WhyWorker};

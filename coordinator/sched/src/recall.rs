@@ -35,6 +35,7 @@ impl Sched {
         tally.blocks_done += u64::from(blocks);
         tally.render_time = Span(tally.render_time.0.saturating_add(render_time.0));
         tally.started.get_or_insert(now);
+        job.spread.note(cost_of(render_time, SPEED_USUAL));
         self.job_changed(image.job);
         self.end_job_if_done(image.job, out);
     }
@@ -42,8 +43,12 @@ impl Sched {
 
 impl Job {
     /// Notes what a block of an earlier epoch took. Whose it was is forgotten, so it counts as of usual speed.
-    pub(crate) fn recall_block(&mut self, block: Rect, elapsed: Span) {
-        self.costs.note(block, cost_of(elapsed, SPEED_USUAL));
+    pub(crate) fn recall_block(&mut self, place: u32, block: Rect, elapsed: Span) {
+        let cost = cost_of(elapsed, SPEED_USUAL);
+        self.costs.note(block, cost);
+        if let Some(work) = self.work.get_mut(&place) {
+            work.spent = work.spent.saturating_add(cost);
+        }
         let render_time = &mut self.tally.render_time;
         *render_time = Span(render_time.0.saturating_add(elapsed.0));
     }

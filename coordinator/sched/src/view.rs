@@ -79,6 +79,17 @@ pub struct JobView<'a> {
     pub ended: Option<Timestamp>,
 }
 
+/// How long a job will still take.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Estimate {
+    /// As expected.
+    pub left: Span,
+    /// It may be over as early as this…
+    pub early: Span,
+    /// …or as late as this; in about one of seven jobs it is outside of both.
+    pub late: Span,
+}
+
 /// Whether a job is over.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub enum JobState {

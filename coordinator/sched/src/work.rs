@@ -29,6 +29,8 @@ const LOOKED_AT_MAX: usize = 16;
 pub(crate) struct Work {
     pub(crate) pixels: PixelsDone,
     pub(crate) tiles: Tiles,
+    /// What its durable blocks cost.
+    pub(crate) spent: u64,
     /// No more of it is leased: it is about to fail.
     pub(crate) given_up: bool,
     grid: TileGrid,
@@ -84,6 +86,7 @@ impl Work {
         let mut work = Self {
             pixels: PixelsDone::none(grid.window()),
             tiles: Tiles::default(),
+            spent: 0,
             given_up: false,
             grid,
             map,

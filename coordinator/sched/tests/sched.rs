@@ -77,6 +77,21 @@ fn only_so_many_images_are_in_flight_and_they_begin_in_order() {
 }
 
 #[test]
+fn small_images_are_in_flight_in_large_numbers() {
+    let config = Config::new(EPOCH);
+    assert_eq!(config.images_in_flight(8192 * 8192), 8);
+    assert_eq!(config.images_in_flight(2048 * 1024), 32);
+    assert_eq!(config.images_in_flight(64 * 64), 256);
+    // Each is one tile here, and forty workers have something to do.
+    let mut farm = farm();
+    for id in 1..=40 {
+        farm.worker(id, 1);
+    }
+    farm.job(30).never_mind();
+    assert!(farm.sched.workers().all(|worker| worker.attempts == 1));
+}
+
+#[test]
 fn the_less_loaded_worker_gets_the_tile() {
     let mut farm = farm();
     farm.worker(1, 4).worker(2, 4).never_mind();

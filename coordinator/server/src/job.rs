@@ -4,7 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, VecDeque};
 use std::sync::Arc;
 
 use image::Formats;
-use model::{ImageNumber, ImageRef, JobId, Span};
+use model::{ImageNumber, ImageRef, JobId, Span, Timestamp};
+use sched::Estimate;
 use tokio::sync::broadcast;
 use wire::proto;
 
@@ -45,6 +46,13 @@ pub(crate) enum Sign {
     Minus,
 }
 
+/// What was expected of a job, and when.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Foretold {
+    pub(crate) at: Timestamp,
+    pub(crate) left: Estimate,
+}
+
 /// One job.
 #[derive(Debug)]
 pub(crate) struct Job {
@@ -64,6 +72,8 @@ pub(crate) struct Job {
     /// Images of which a tile was leased.
     begun: BTreeSet<ImageNumber>,
     new_lines: Vec<proto::LogLine>,
+    /// What was expected when a tenth of it was done.
+    pub(crate) foretold: Option<Foretold>,
     /// Attempts lost and failed that its log already tells of.
     pub(crate) told: (u64, u64),
 }
@@ -81,6 +91,7 @@ impl Job {
             changed: BTreeSet::new(),
             begun: BTreeSet::new(),
             new_lines: Vec::new(),
+            foretold: None,
             told: (0, 0),
         }
     }
@@ -185,7 +196,8 @@ impl Job {
         self.watchers.as_ref().map(broadcast::Sender::subscribe)
     }
 
-    fn has_watchers(&self) -> bool {
+    /// Whether somebody watches.
+    pub(crate) fn has_watchers(&self) -> bool {
         let count = self
             .watchers
             .as_ref()

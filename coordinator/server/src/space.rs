@@ -31,10 +31,10 @@ impl Space {
 pub(crate) fn needed(submission: &sched::Submission, formats: Formats) -> u64 {
     let pixels = submission.window.area();
     let images = u64::from(submission.frames.count());
-    let in_flight = u64::from(sched::Config::new(Epoch(0)).images_in_flight_max);
+    let in_flight = sched::Config::new(Epoch(0)).images_in_flight(pixels);
     let frame: u64 = formats.iter().map(pixel_bytes).sum();
     let frames = images.saturating_mul(pixels).saturating_mul(frame);
-    let scratch = in_flight
+    let scratch = u64::from(in_flight)
         .min(images)
         .saturating_mul(pixels)
         .saturating_mul(PIXEL_BYTES as u64);
@@ -87,6 +87,7 @@ mod tests {
         };
         let both = Formats::new([Format::Exr, Format::Png8]);
         assert_eq!(needed(&submission(1), both), 100 * (22 + 32));
-        assert_eq!(needed(&submission(100), both), 100 * (100 * 22 + 8 * 32));
+        // Small images are in flight all at once.
+        assert_eq!(needed(&submission(100), both), 100 * (100 * 22 + 100 * 32));
     }
 }

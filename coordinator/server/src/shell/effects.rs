@@ -16,9 +16,12 @@ use super::{Shell, Submitting};
 use crate::about::JobAbout;
 use crate::inbox::NewJob;
 use crate::input::Frames;
-use crate::job::Job;
+use crate::job::{Foretold, Job};
 use crate::storage::{Era, Plan};
 use crate::worker::{Draining, Told, Worker};
+
+/// One of how many parts of a job is done when its end is foretold.
+const FORETOLD_AT: u64 = 10;
 
 impl Shell {
     /// Performs one effect.
@@ -123,6 +126,7 @@ impl Shell {
             Effect::JobChanged { job } => {
                 self.jobs.touch(job);
                 self.tell_of_attempts(job);
+                self.foretell(job);
             }
             Effect::Forget { worker } => {
                 if let Some(known) = self.workers.remove(&worker) {
@@ -335,6 +339,11 @@ impl Shell {
                 format!("frame {} failed: {}", failure.image, failure.reason),
             );
         }
+        if outcome == JobOutcome::Finished
+            && let Some(said) = self.was_foretold(id)
+        {
+            self.say(id, said);
+        }
         self.say(id, format!("the job is {words}"));
         if let (Some(view), Some(job)) = (self.sched.job(id), self.jobs.get(id)) {
             self.hook.job_ended(|| {
@@ -406,6 +415,39 @@ impl Shell {
                 ),
             );
         }
+    }
+
+    /// Notes what is expected of a job when a tenth of it is done.
+    fn foretell(&mut self, id: JobId) {
+        let Some(view) = self.sched.job(id) else {
+            return;
+        };
+        let done = view.pixels_done.saturating_mul(FORETOLD_AT);
+        // One that was recalled in its middle is not foretold.
+        let is_due = (view.pixels..2 * view.pixels).contains(&done);
+        let is_new = |job: &Job| job.foretold.is_none();
+        if !is_due || !self.jobs.get(id).is_some_and(is_new) {
+            return;
+        }
+        let (at, left) = (self.now(), self.sched.time_left(id));
+        if let Some(job) = self.jobs.get_mut(id) {
+            job.foretold = left.map(|left| Foretold { at, left });
+        }
+    }
+
+    /// How right it was.
+    fn was_foretold(&self, id: JobId) -> Option<String> {
+        let Foretold { at, left } = self.jobs.get(id)?.foretold?;
+        let took = (self.now() - at).0;
+        let seconds = |micros: u64| micros as f64 / 1e6;
+        let off = (seconds(took) / seconds(left.left.0).max(1e-6) - 1.0) * 100.0;
+        Some(format!(
+            "from its first tenth on it took {:.1} s, {off:+.0} % of what was expected then: {:.1} s ({:.1} to {:.1})",
+            seconds(took),
+            seconds(left.left.0),
+            seconds(left.early.0),
+            seconds(left.late.0),
+        ))
     }
 
     /// Tells the jobs in hand that a worker's link closed.

@@ -30,7 +30,7 @@ use crate::config::{Config, scheduling};
 use crate::hook::Hook;
 use crate::inbox::NewJob;
 use crate::input::{Frames, Input, News, Reply};
-use crate::job::Jobs;
+use crate::job::{Job, Jobs};
 use crate::state::State;
 use crate::storage::{Era, Hand, Storage};
 use crate::worker::Workers;
@@ -189,7 +189,12 @@ impl Shell {
 
     fn tell_watchers(&mut self) {
         for id in self.jobs.take_dirty() {
-            let Some(summary) = self.summary(id) else {
+            let is_watched = self.jobs.get(id).is_some_and(Job::has_watchers);
+            let summary = match is_watched {
+                true => self.summary_with_estimate(id),
+                false => self.summary(id),
+            };
+            let Some(summary) = summary else {
                 continue;
             };
             let over = views::is_over(&summary);

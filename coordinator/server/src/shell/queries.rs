@@ -10,13 +10,22 @@ use crate::clock::unix_ms;
 use crate::input::{Query, Snapshot, Wanted, WhyOf};
 use crate::job::IMAGES_PER_MESSAGE;
 
+/// Most jobs that are running where all of them are asked how long they will take: each is looked at for each.
+const ESTIMATES_MAX: usize = 64;
+
 impl Shell {
     /// Answers one question; whoever asked may have left.
     pub(super) fn answer(&self, query: Query) {
         match query {
             Query::Jobs(reply) => {
                 let jobs = self.sched.jobs();
-                let jobs = jobs.filter_map(|view| self.summary(view.job));
+                let running = jobs.filter(|job| job.state == sched::JobState::Running);
+                let are_few = running.count() <= ESTIMATES_MAX;
+                let jobs = self.sched.jobs();
+                let jobs = jobs.filter_map(|view| match are_few {
+                    true => self.summary_with_estimate(view.job),
+                    false => self.summary(view.job),
+                });
                 // All jobs must fit into one message.
                 let short = |summary| proto::JobSummary {
                     counters: Vec::new(),
@@ -58,6 +67,14 @@ impl Shell {
     pub(super) fn summary(&self, id: JobId) -> Option<proto::JobSummary> {
         let view = self.sched.job(id)?;
         Some(views::summary(&view, self.jobs.get(id)?))
+    }
+
+    /// The same, with how long it will still take.
+    pub(super) fn summary_with_estimate(&self, id: JobId) -> Option<proto::JobSummary> {
+        Some(proto::JobSummary {
+            left: self.sched.time_left(id).map(views::estimate),
+            ..self.summary(id)?
+        })
     }
 
     /// Why something is not finished, or has nothing to do.
@@ -124,7 +141,7 @@ impl Shell {
     }
 
     fn snapshot(&self, id: JobId) -> Result<Snapshot, Failure> {
-        let (Some(summary), Some(job)) = (self.summary(id), self.jobs.get(id)) else {
+        let (Some(summary), Some(job)) = (self.summary_with_estimate(id), self.jobs.get(id)) else {
             return Err(views::no_job(id));
         };
         let mut parts: Vec<proto::JobSnapshot> = Vec::new();

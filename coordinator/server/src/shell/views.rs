@@ -86,6 +86,16 @@ pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
         focus: view.focus.map(Into::into),
         blocks_twice: view.blocks_twice,
         incidents: view.incidents,
+        left: None,
+    }
+}
+
+/// How long a job will still take.
+pub(super) fn estimate(left: sched::Estimate) -> proto::Estimate {
+    proto::Estimate {
+        expected_ms: left.left.0 / 1_000,
+        early_ms: left.early.0 / 1_000,
+        late_ms: left.late.0 / 1_000,
     }
 }
 
