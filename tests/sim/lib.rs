@@ -74,7 +74,7 @@ fn wrong_pixels_are_noticed_where_a_tile_is_rendered_twice() {
 }
 
 #[test]
-#[ignore = "1,000 keys and 10 million events, or as many keys as FLYBY_SIM_KEYS says"]
+#[ignore = "long: tests/run --all"]
 fn everything_at_once_for_long() {
     let keys = number_from("FLYBY_SIM_KEYS").unwrap_or(1_000);
     let report = all(0..keys, |key| {
