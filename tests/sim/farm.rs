@@ -39,7 +39,7 @@ enum Happening {
 
 /// Who is told that time has passed.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Clock {
+enum Whose {
     Coordinator,
     Worker(WorkerId),
 }
@@ -148,9 +148,9 @@ impl Farm {
                 self.now = time;
                 self.live_through(happening);
             }
-        } else if let Some((due, clock)) = tick {
+        } else if let Some((due, whose)) = tick {
             self.now = due;
-            self.tick(clock);
+            self.tick(whose);
         } else {
             return false;
         }
@@ -159,24 +159,24 @@ impl Farm {
     }
 
     /// Whose deadline is next; whoever is frozen looks at the clock later.
-    fn next_tick(&self) -> Option<(Timestamp, Clock)> {
+    fn next_tick(&self) -> Option<(Timestamp, Whose)> {
         let coordinator = self.coordinator.next_deadline();
-        let coordinator = coordinator.map(|due| (due.max(self.paused_until), Clock::Coordinator));
+        let coordinator = coordinator.map(|due| (due.max(self.paused_until), Whose::Coordinator));
         let workers = self.workers.iter().filter_map(|(&id, worker)| {
-            let due = worker.session.next_deadline()?;
-            Some((due.max(worker.frozen_until), Clock::Worker(id)))
+            let due = worker.next_deadline()?;
+            Some((due, Whose::Worker(id)))
         });
-        let (due, clock) = workers.chain(coordinator).min()?;
-        Some((due.max(self.now), clock))
+        let (due, whose) = workers.chain(coordinator).min()?;
+        Some((due.max(self.now), whose))
     }
 
-    fn tick(&mut self, clock: Clock) {
-        match clock {
-            Clock::Coordinator => self.coordinator.tell(self.now, sched::Event::Tick),
-            Clock::Worker(id) => self.tell_worker(id, Event::Tick),
+    fn tick(&mut self, whose: Whose) {
+        match whose {
+            Whose::Coordinator => self.coordinator.tell(self.now, sched::Event::Tick),
+            Whose::Worker(id) => self.tell_worker(id, Event::Tick),
         }
         let next = self.next_tick();
-        let is_later = |(due, next)| next != clock || due > self.now;
+        let is_later = |(due, next)| next != whose || due > self.now;
         assert!(next.is_none_or(is_later), "a tick is worth sending");
     }
 
@@ -263,7 +263,7 @@ impl Farm {
             1
         };
         let pace = Span::from_millis(20 + self.random.below(400)).times(slower);
-        let mut worker = Worker::new(id, threads, pace);
+        let mut worker = Worker::new(self.now, id, threads, pace);
         worker.lies = self.random.happens(self.troubles.liars);
         self.workers.insert(id, worker);
         self.plan(after, Happening::Start(id));
@@ -438,10 +438,10 @@ impl Farm {
             }
             if self.random.happens(troubles.freezes) {
                 let until = self.now + self.random.span(Span::from_secs(5));
-                if let Some(worker) = self.workers.get_mut(&id) {
-                    worker.frozen_until = until;
-                }
-                self.plan_all_anew();
+                self.freeze(id, until);
+            }
+            if self.random.happens(troubles.clocks) {
+                self.trouble_clock(id);
             }
             if self.random.happens(troubles.leaves) {
                 let event = match self.random.below(2) {
@@ -470,6 +470,31 @@ impl Farm {
         }
         if !self.is_done() {
             self.plan(Span::from_secs(1), Happening::Trouble);
+        }
+    }
+
+    /// A worker does nothing before.
+    fn freeze(&mut self, id: WorkerId, until: Timestamp) {
+        if let Some(worker) = self.workers.get_mut(&id) {
+            worker.frozen_until = until;
+        }
+        self.plan_all_anew();
+    }
+
+    fn trouble_clock(&mut self, id: WorkerId) {
+        let Some(worker) = self.workers.get_mut(&id) else {
+            return;
+        };
+        let kind = self.random.below(3);
+        if kind == 0 {
+            let ahead = self.random.span(Span::from_secs(10));
+            return worker.clock.jumps(ahead);
+        }
+        let until = self.now + self.random.span(Span::from_secs(5));
+        worker.clock.stands_still(self.now, until);
+        // As on a machine that sleeps: nothing happens there meanwhile.
+        if kind == 1 {
+            self.freeze(id, until);
         }
     }
 

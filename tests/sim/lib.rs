@@ -2,7 +2,7 @@
 //! network, clock and processor, all from one key.
 //!
 //! Messages are late and come twice; links are cut; workers are killed, frozen, cut off, drained,
-//! stopped, slow and wrong; the coordinator is frozen, its clock jumps, its disk is full, its machine crashes and loses, tears
+//! stopped, slow and wrong, and their clocks jump and stand still; the coordinator is frozen, its clock jumps, its disk is full, its machine crashes and loses, tears
 //! and reorders whatever was not synced; users change their minds. However that goes, every job ends by itself,
 //! every frame is whole and right, nothing acknowledged is rendered again, every lease ends and every queue is bounded.
 //!
@@ -11,6 +11,7 @@
 #![cfg(test)]
 
 mod bugs;
+mod clock;
 mod coordinator;
 mod disk;
 mod farm;
@@ -48,6 +49,18 @@ fn crashes_of_the_coordinator() {
 }
 
 #[test]
+fn clocks_of_workers() {
+    let troubles = Troubles {
+        clocks: 300,
+        cuts: 100,
+        ..Troubles::NONE
+    };
+    all(0..number_from("FLYBY_SIM_KEYS").unwrap_or(15), |key| {
+        Plan::new(key, troubles)
+    });
+}
+
+#[test]
 fn users_who_change_their_minds() {
     let troubles = Troubles {
         wishes: 400,
@@ -75,7 +88,7 @@ fn wrong_pixels_are_noticed_where_a_tile_is_rendered_twice() {
 }
 
 #[test]
-#[ignore = "1,000 keys and 10 million events, or as many keys as FLYBY_SIM_KEYS says"]
+#[ignore = "long: tests/run --all"]
 fn everything_at_once_for_long() {
     let keys = number_from("FLYBY_SIM_KEYS").unwrap_or(1_000);
     let report = all(0..keys, |key| {

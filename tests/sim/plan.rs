@@ -25,6 +25,8 @@ pub(crate) struct Troubles {
     pub(crate) fulls: u64,
     /// In a second of the farm, the coordinator's clock jumps.
     pub(crate) jumps: u64,
+    /// In a second of the farm, a worker's clock jumps ahead or stands still.
+    pub(crate) clocks: u64,
     /// In a second of the farm, a user wants something.
     pub(crate) wishes: u64,
     /// A tile fails.
@@ -47,6 +49,7 @@ impl Troubles {
         crashes: 0,
         fulls: 0,
         jumps: 0,
+        clocks: 0,
         wishes: 0,
         failures: 0,
         liars: 0,
@@ -65,6 +68,7 @@ impl Troubles {
         crashes: 10,
         fulls: 10,
         jumps: 2,
+        clocks: 8,
         wishes: 30,
         failures: 5,
         liars: 0,
@@ -73,7 +77,7 @@ impl Troubles {
 
     /// The same without each of them in turn.
     fn fewer(self) -> Vec<Self> {
-        let fields: [fn(&mut Self) -> &mut u64; 14] = [
+        let fields: [fn(&mut Self) -> &mut u64; 15] = [
             |it| &mut it.repeats,
             |it| &mut it.cuts,
             |it| &mut it.partitions,
@@ -84,6 +88,7 @@ impl Troubles {
             |it| &mut it.crashes,
             |it| &mut it.fulls,
             |it| &mut it.jumps,
+            |it| &mut it.clocks,
             |it| &mut it.wishes,
             |it| &mut it.failures,
             |it| &mut it.liars,

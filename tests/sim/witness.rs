@@ -109,9 +109,6 @@ impl Witness {
 
     /// Holds a scheduler that was told what the store recalls against what was promised.
     pub(crate) fn compare(&mut self, sched: &Sched, recalled: &Recalled) {
-        if let Some(before) = self.before.take() {
-            are_alike(&before, sched);
-        }
         for &job in &self.jobs {
             let state = sched.job(job).map(|job| job.state);
             assert!(state.is_some(), "{job:?}: a job that was taken is there");
@@ -154,6 +151,10 @@ impl Witness {
             );
             begins
         });
+        // Last, since what is missing here is better said by one of those above.
+        if let Some(before) = self.before.take() {
+            are_alike(&before, sched);
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use model::{AttemptId, ImageRef, Lease, Rect, Span, Timestamp, WorkerId};
 use sched::BlockRef;
 use session::{Backoff, Config, Effect, Event, Session};
 
+use crate::clock::Clock;
 use crate::disk::Pixels;
 use crate::message::{Down, Up};
 
@@ -21,7 +22,8 @@ pub(crate) enum Wish {
 }
 
 pub(crate) struct Worker {
-    pub(crate) session: Session,
+    session: Session,
+    pub(crate) clock: Clock,
     pub(crate) frozen_until: Timestamp,
     pub(crate) gone: bool,
     /// How long one of its threads takes over a block, in the mean.
@@ -50,7 +52,7 @@ struct Tile {
 }
 
 impl Worker {
-    pub(crate) fn new(id: WorkerId, threads: u32, pace: Span) -> Self {
+    pub(crate) fn new(now: Timestamp, id: WorkerId, threads: u32, pace: Span) -> Self {
         let config = Config {
             unacked_blocks_max: 12,
             backoff: Backoff {
@@ -61,6 +63,7 @@ impl Worker {
         };
         Self {
             session: Session::new(config.clone()),
+            clock: Clock::new(now),
             frozen_until: Timestamp(0),
             gone: false,
             pace,
@@ -74,6 +77,12 @@ impl Worker {
             lies: false,
             wishes: Vec::new(),
         }
+    }
+
+    /// When, by the world's clock, it wants to look at its own.
+    pub(crate) fn next_deadline(&self) -> Option<Timestamp> {
+        let due = self.clock.shows(self.session.next_deadline()?);
+        Some(due.max(self.frozen_until))
     }
 
     /// What it wished for since the last time.
@@ -137,7 +146,8 @@ impl Worker {
     pub(crate) fn tell(&mut self, now: Timestamp, event: Event) {
         let mut effects = Vec::new();
         self.events += 1;
-        self.session.handle(now, event, &mut effects);
+        self.session
+            .handle(self.clock.read(now), event, &mut effects);
         self.session.check_invariants();
         for effect in effects {
             assert!(!self.gone, "nothing follows the exit");

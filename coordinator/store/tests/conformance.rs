@@ -4,11 +4,9 @@
 
 mod sample;
 
-use std::path::{Path, PathBuf};
-
 use model::{ImageNumber, JobId, Rect, Span};
 use proptest::prelude::*;
-use sample::{block, digest, encoded, failed, image, line, submission, submitted, wants};
+use sample::{block, digest, encoded, failed, image, line, rect, submission, submitted, wants};
 use sched::{Command, TileShape};
 use store::{Entry, LOG_LINES_MAX, Memory, Recalled, RecalledImage, RecalledJob, Sqlite, Store};
 use tempfile::TempDir;
@@ -22,18 +20,21 @@ trait Crash: Store + Sized {
 struct InFolder {
     // Closed before the folder goes.
     store: Option<Sqlite>,
-    path: PathBuf,
-    _folder: TempDir,
+    folder: TempDir,
 }
+
+const FILE: &str = "store.sqlite";
 
 impl InFolder {
     fn new() -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("store.sqlite");
+        Self::open(tempfile::tempdir().unwrap())
+    }
+
+    fn open(folder: TempDir) -> Self {
+        let store = Sqlite::open(&folder.path().join(FILE)).unwrap();
         Self {
-            store: Some(Sqlite::open(&path).unwrap()),
-            path,
-            _folder: folder,
+            store: Some(store),
+            folder,
         }
     }
 
@@ -56,21 +57,12 @@ impl Crash for InFolder {
     /// The files as they are at this moment, and nothing that closing might add.
     fn crash(mut self) -> Self {
         let after = tempfile::tempdir().unwrap();
-        let path = after.path().join("store.sqlite");
-        for ending in ["", "-wal"] {
-            std::fs::copy(with(&self.path, ending), with(&path, ending)).unwrap();
+        for name in [FILE, "store.sqlite-wal"] {
+            std::fs::copy(self.folder.path().join(name), after.path().join(name)).unwrap();
         }
         drop(self.store.take());
-        Self {
-            store: Some(Sqlite::open(&path).unwrap()),
-            path,
-            _folder: after,
-        }
+        Self::open(after)
     }
-}
-
-fn with(path: &Path, ending: &str) -> PathBuf {
-    format!("{}{ending}", path.display()).into()
 }
 
 impl Crash for Memory {
@@ -83,6 +75,18 @@ fn only(store: &mut impl Store) -> RecalledJob {
     let mut jobs = store.recall().unwrap().jobs;
     assert_eq!(jobs.len(), 1);
     jobs.remove(0)
+}
+
+/// The only job, as it comes back after these entries and a crash.
+fn only_after(mut store: impl Crash, entries: &[Entry]) -> RecalledJob {
+    store.commit(entries).unwrap();
+    only(&mut store.crash())
+}
+
+/// The images and places of its blocks.
+fn places(job: &RecalledJob) -> Vec<(u32, Rect)> {
+    let blocks = job.blocks.iter();
+    blocks.map(|block| (block.image.0, block.rect)).collect()
 }
 
 fn nothing_at_first(mut store: impl Crash) {
@@ -149,11 +153,12 @@ fn a_job_that_is_known_stays_what_it_is(mut store: impl Crash) {
         submission: submission(2),
         about: "other".into(),
     };
-    store.commit(&[submitted(1), second]).unwrap();
-    assert_eq!(only(&mut store).submission, submission(1));
+    store.commit(&[submitted(1)]).unwrap();
+    let first = only(&mut store);
+    assert_eq!(only_after(store, &[second]), first);
 }
 
-fn blocks_are_kept_once_and_in_order(mut store: impl Crash) {
+fn blocks_are_kept_once_and_in_order(store: impl Crash) {
     let twice = Entry::Block {
         image: image(1, 3),
         rect: rect(0),
@@ -161,20 +166,19 @@ fn blocks_are_kept_once_and_in_order(mut store: impl Crash) {
         pixels: digest(99),
         about: Vec::new(),
     };
-    store
-        .commit(&[
+    let job = only_after(
+        store,
+        &[
             submitted(1),
             block(1, 4, 0),
             block(1, 3, 2),
             block(1, 3, 0),
             twice,
             block(1, 3, 1),
-        ])
-        .unwrap();
-    let job = only(&mut store.crash());
-    let order: Vec<_> = job.blocks.iter().map(|b| (b.image.0, b.rect)).collect();
+        ],
+    );
     assert_eq!(
-        order,
+        places(&job),
         [(3, rect(0)), (3, rect(1)), (3, rect(2)), (4, rect(0))]
     );
     assert_eq!(job.blocks[0].pixels, digest(0));
@@ -196,17 +200,15 @@ fn lost_blocks_can_come_again(mut store: impl Crash) {
             lost(vec![rect(0), rect(2)]),
         ])
         .unwrap();
-    let of =
-        |job: &RecalledJob| -> Vec<_> { job.blocks.iter().map(|b| (b.image.0, b.rect)).collect() };
-    assert_eq!(of(&only(&mut store)), [(3, rect(1)), (4, rect(0))]);
-    store.commit(&[block(1, 3, 0)]).unwrap();
-    let expected = [(3, rect(0)), (3, rect(1)), (4, rect(0))];
-    assert_eq!(of(&only(&mut store.crash())), expected);
+    assert_eq!(places(&only(&mut store)), [(3, rect(1)), (4, rect(0))]);
+    let job = only_after(store, &[block(1, 3, 0)]);
+    assert_eq!(places(&job), [(3, rect(0)), (3, rect(1)), (4, rect(0))]);
 }
 
-fn an_image_that_is_over_has_no_blocks(mut store: impl Crash) {
-    store
-        .commit(&[
+fn an_image_that_is_over_has_no_blocks(store: impl Crash) {
+    let job = only_after(
+        store,
+        &[
             submitted(1),
             block(1, 3, 0),
             block(1, 4, 0),
@@ -218,9 +220,8 @@ fn an_image_that_is_over_has_no_blocks(mut store: impl Crash) {
             block(1, 4, 1),
             failed(1, 3),
             encoded(1, 4),
-        ])
-        .unwrap();
-    let job = only(&mut store.crash());
+        ],
+    );
     assert_eq!(job.blocks.len(), 1);
     assert_eq!(
         job.images,
@@ -242,9 +243,10 @@ fn an_image_that_is_over_has_no_blocks(mut store: impl Crash) {
     );
 }
 
-fn retry_and_again_make_images_nothing(mut store: impl Crash) {
-    store
-        .commit(&[
+fn retry_and_again_make_images_nothing(store: impl Crash) {
+    let job = only_after(
+        store,
+        &[
             submitted(1),
             encoded(1, 3),
             encoded(1, 4),
@@ -255,9 +257,8 @@ fn retry_and_again_make_images_nothing(mut store: impl Crash) {
             wants(1, Command::Again(ImageNumber(6))),
             block(1, 3, 0),
             block(1, 5, 0),
-        ])
-        .unwrap();
-    let job = only(&mut store.crash());
+        ],
+    );
     let over: Vec<_> = job.images.iter().map(|image| image.image().0).collect();
     assert_eq!(over, [4]);
     let begun: Vec<_> = job.blocks.iter().map(|block| block.image.0).collect();
@@ -280,17 +281,16 @@ fn commands_change_the_job(mut store: impl Crash) {
     assert_eq!((job.priority, job.share), (-7, 9));
     assert_eq!(job.submission, submission(1));
     assert_eq!(job.focus, Some(rect(2)));
-    store
-        .commit(&[wants(1, Command::Resume), wants(1, Command::Focus(None))])
-        .unwrap();
-    let job = only(&mut store.crash());
+    let resumed = [wants(1, Command::Resume), wants(1, Command::Focus(None))];
+    let job = only_after(store, &resumed);
     assert!(!job.paused);
     assert_eq!(job.focus, None);
 }
 
-fn a_cancelled_job_keeps_its_frames_alone(mut store: impl Crash) {
-    store
-        .commit(&[
+fn a_cancelled_job_keeps_its_frames_alone(store: impl Crash) {
+    let job = only_after(
+        store,
+        &[
             submitted(1),
             encoded(1, 3),
             block(1, 4, 0),
@@ -301,9 +301,8 @@ fn a_cancelled_job_keeps_its_frames_alone(mut store: impl Crash) {
             // In its place before the encoder heard of it.
             encoded(1, 5),
             line(1, "cancelled"),
-        ])
-        .unwrap();
-    let job = only(&mut store.crash());
+        ],
+    );
     assert_eq!(job.cancelled_unix_ms, Some(4_000));
     assert!(job.blocks.is_empty() && !job.paused);
     assert_eq!(job.images.len(), 2);
@@ -319,8 +318,7 @@ fn cancelling_a_job_that_is_over_changes_nothing(mut store: impl Crash) {
         block(1, 3, 0),
     ];
     store.commit(&over).unwrap();
-    store.commit(&retried).unwrap();
-    let job = only(&mut store.crash());
+    let job = only_after(store, &retried);
     assert_eq!(job.cancelled_unix_ms, None);
     assert_eq!((job.images.len(), job.blocks.len()), (5, 1));
 }
@@ -376,10 +374,6 @@ fn a_log_is_bounded(mut store: impl Crash) {
     assert_eq!(long.log[0], (5_000, "7".to_owned()));
     assert_eq!(long.log[LOG_LINES_MAX - 1].1, "1006");
     assert_eq!((short.log.len(), short.log_dropped), (1, 0));
-}
-
-fn rect(column: u32) -> Rect {
-    sample::rect(column)
 }
 
 macro_rules! for_every_store {
@@ -474,6 +468,6 @@ fn a_full_memory_keeps_nothing_of_a_commit() {
         assert!(refused.is_transient());
         assert!(only(&mut store).blocks.is_empty());
     }
-    store.commit(&[block(1, 3, 0)]).unwrap();
-    assert_eq!(only(&mut store.crash()).blocks.len(), 1);
+    let job = only_after(store, &[block(1, 3, 0)]);
+    assert_eq!(job.blocks.len(), 1);
 }

@@ -5,7 +5,7 @@
 mod sample;
 
 use model::{Digest, Epoch, ImageNumber, JobId, Timestamp};
-use sample::{block, encoded, failed, image, submission, submitted, wants};
+use sample::{block, encoded, failed, image, submission, submitted, submitted_as, wants};
 use sched::{
     Command, Config, Effect, Event, ImageState, JobOutcome, JobState, Paused, Sched, Submission,
 };
@@ -63,12 +63,7 @@ fn numbers_of_forgotten_jobs_are_not_given_again() {
     let entries = [
         submitted(2),
         submitted(3),
-        Entry::Submitted {
-            job: JobId(5),
-            unix_ms: 1,
-            submission: after,
-            about: String::new(),
-        },
+        submitted_as(5, after),
         submitted(8),
         Entry::Forgotten { job: JobId(2) },
         Entry::Forgotten { job: JobId(8) },

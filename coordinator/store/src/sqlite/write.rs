@@ -172,8 +172,7 @@ impl Writer<'_> {
         }
         let sql = "SELECT 1 FROM jobs WHERE job = ?1 AND cancelled_unix_ms IS NULL
                  AND NOT EXISTS (SELECT 1 FROM images WHERE job = ?1 AND image = ?2)";
-        let mut statement = self.connection.prepare_cached(sql)?;
-        let wanted = statement.exists(params![int(image.job.0), image.image.0])?;
+        let wanted = self.exists(sql, params![int(image.job.0), image.image.0])?;
         self.wanted = Some((image, wanted));
         Ok(wanted)
     }
@@ -202,11 +201,9 @@ impl Writer<'_> {
 
     fn command(&self, job: JobId, unix_ms: u64, command: Command) -> rusqlite::Result<()> {
         let id = int(job.0);
-        if command == Command::Remove {
-            return self.forget(job);
-        }
-        let sql = "SELECT 1 FROM jobs WHERE job = ?1 AND cancelled_unix_ms IS NULL";
-        if !self.connection.prepare_cached(sql)?.exists([id])? {
+        // One that was cancelled can only be removed.
+        let open = "SELECT 1 FROM jobs WHERE job = ?1 AND cancelled_unix_ms IS NULL";
+        if command != Command::Remove && !self.exists(open, [id])? {
             return Ok(());
         }
         match command {
@@ -252,22 +249,16 @@ impl Writer<'_> {
                     focus.map(|focus| focus.y1),
                 ],
             ),
-            Command::Remove => Ok(()),
+            Command::Remove => self.forget(job),
         }
     }
 
     fn forget(&self, job: JobId) -> rusqlite::Result<()> {
-        for sql in [
-            "DELETE FROM blocks WHERE job = ?1",
-            "DELETE FROM images WHERE job = ?1",
-            "DELETE FROM log WHERE job = ?1",
-            "DELETE FROM waits WHERE job = ?1",
-            "DELETE FROM labels WHERE job = ?1",
-            "DELETE FROM jobs WHERE job = ?1",
-        ] {
-            self.run(sql, [int(job.0)])?;
-        }
-        Ok(())
+        let tables = ["blocks", "images", "log", "waits", "labels", "jobs"];
+        tables.into_iter().try_for_each(|table| {
+            let sql = format!("DELETE FROM {table} WHERE job = ?1");
+            self.run(&sql, [int(job.0)])
+        })
     }
 
     fn line(&self, job: JobId, unix_ms: u64, text: &str) -> rusqlite::Result<()> {
@@ -285,6 +276,10 @@ impl Writer<'_> {
                  AND line <= (SELECT log_lines FROM jobs WHERE job = ?1) - ?2",
             [job, int(LOG_LINES_MAX as u64)],
         )
+    }
+
+    fn exists(&self, sql: &str, params: impl Params) -> rusqlite::Result<bool> {
+        self.connection.prepare_cached(sql)?.exists(params)
     }
 
     fn run(&self, sql: &str, params: impl Params) -> rusqlite::Result<()> {

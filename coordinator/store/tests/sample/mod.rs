@@ -54,10 +54,14 @@ pub(crate) fn submission(number: u64) -> Submission {
 }
 
 pub(crate) fn submitted(job: u64) -> Entry {
+    submitted_as(job, submission(job))
+}
+
+pub(crate) fn submitted_as(job: u64, submission: Submission) -> Entry {
     Entry::Submitted {
         job: JobId(job),
         unix_ms: 1_000,
-        submission: submission(job),
+        submission,
         about: "{\"stem\":\"flight\"}".into(),
     }
 }
@@ -105,4 +109,51 @@ pub(crate) fn line(job: u64, text: &str) -> Entry {
         unix_ms: 5_000,
         text: text.to_owned(),
     }
+}
+
+/// What `tests/samples/v1.sqlite` holds; `store-other sample FILE` writes one of the newest schema.
+pub(crate) fn sampled() -> Vec<Entry> {
+    let mut waits = submission(3);
+    waits.after = vec![JobId(2), JobId(1)];
+    vec![
+        submitted(1),
+        submitted(2),
+        submitted_as(3, waits),
+        encoded(1, 3),
+        failed(1, 4),
+        block(1, 5, 0),
+        block(1, 5, 3),
+        line(1, "image 3 is in its place"),
+        wants(1, Command::Pause),
+        wants(1, Command::Focus(Some(rect(1)))),
+        block(2, 3, 0),
+        wants(2, Command::Cancel),
+        submitted(9),
+        Entry::Forgotten { job: JobId(9) },
+    ]
+}
+
+/// Blocks in a `group`.
+pub(crate) const GROUP: usize = 50;
+
+/// The `number`-th of many commits of blocks, all of them different.
+pub(crate) fn group(number: usize) -> Vec<Entry> {
+    let columns = (number * GROUP..).take(GROUP);
+    columns
+        .map(|column| {
+            let column = u32::try_from(column).expect("a test has not so many");
+            Entry::Block {
+                image: image(1, 3),
+                rect: Rect {
+                    x0: column,
+                    y0: 0,
+                    x1: column + 1,
+                    y1: 1,
+                },
+                elapsed: Span(1),
+                pixels: digest(column),
+                about: vec![0; 20],
+            }
+        })
+        .collect()
 }
