@@ -16,6 +16,9 @@ use crate::{Config, Effect, RevokeReason, Sched};
 /// Most jobs of which a worker's faults are remembered; the oldest are forgotten.
 const JOBS_REMEMBERED: usize = 16;
 
+/// A worker whose pixels were wrong is set aside for so many times as long as one that fails.
+const EXPELLED_FOR: u64 = 12;
+
 /// What a worker is set aside for, and why.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Aside {
@@ -79,6 +82,15 @@ impl Aside {
         Verdict::AsideForJob
     }
 
+    /// Gets no tile of a job until then, whatever else; whether that is news.
+    fn is_doubted(&mut self, job: JobId, until: Timestamp) -> bool {
+        let is_new = self.job(job).is_none();
+        if is_new {
+            self.jobs.push((job, until));
+        }
+        is_new
+    }
+
     /// The worker did a tile of a job.
     fn succeeds(&mut self, job: JobId) {
         self.faults.retain(|&(of, _)| of != job);
@@ -134,6 +146,12 @@ impl Sched {
         if worker.aside.fails(job, self.now, &self.config) == Verdict::Nothing {
             return;
         }
+        self.is_set_aside(place, job, out);
+    }
+
+    /// A worker gets no more tiles of a job for a while.
+    fn is_set_aside(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
+        let worker = &mut self.workers[place];
         let next = worker.aside.next();
         self.timers
             .set(Timer::LetBack(place), &mut worker.aside.alarm, next);
@@ -141,6 +159,54 @@ impl Sched {
             job.aside += 1;
         }
         self.call_back_ahead(place, Some(job), RevokeReason::CalledBack, out);
+        self.worker_changed(place);
+        self.market.touch(self.workers[place].kinds);
+    }
+
+    /// Nobody knows yet whether a worker's pixels are right: it gets no more of the job until that is decided, or for a while.
+    pub(crate) fn doubt(&mut self, id: WorkerId, job: JobId, out: &mut Vec<Effect>) {
+        let until = self.now + self.config.aside;
+        if let Some(place) = self.workers.place(id)
+            && self.workers[place].aside.is_doubted(job, until)
+        {
+            self.is_set_aside(place, job, out);
+        }
+    }
+
+    /// A worker's pixels were right.
+    pub(crate) fn acquit(&mut self, id: WorkerId, job: JobId) {
+        let Some(place) = self.workers.place(id) else {
+            return;
+        };
+        let aside = &mut self.workers[place].aside;
+        if aside.job(job).is_some() {
+            aside.jobs.retain(|&(of, _)| of != job);
+            let next = aside.next();
+            self.timers.set(
+                Timer::LetBack(place),
+                &mut self.workers[place].aside.alarm,
+                next,
+            );
+            if let Some(job) = self.jobs.get_mut(&job) {
+                job.aside -= 1;
+            }
+            self.worker_changed(place);
+            self.market.touch(self.workers[place].kinds);
+        }
+    }
+
+    /// A worker's pixels were wrong: it gets no tile of anything for long.
+    pub(crate) fn expel(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
+        let until = self.now + self.config.aside.times(EXPELLED_FOR);
+        let Some(place) = self.workers.place(id) else {
+            return;
+        };
+        let worker = &mut self.workers[place];
+        worker.aside.farm = Some(until);
+        let next = worker.aside.next();
+        self.timers
+            .set(Timer::LetBack(place), &mut worker.aside.alarm, next);
+        self.call_back_ahead(place, None, RevokeReason::Differs, out);
         self.worker_changed(place);
         self.market.touch(self.workers[place].kinds);
     }

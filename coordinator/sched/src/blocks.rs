@@ -2,11 +2,14 @@
 
 use alloc::vec::Vec;
 
-use model::{Digest, ImageRef, Rect, Span, WorkerId};
+use model::{Digest, ImageRef, Span, WorkerId};
 
 use crate::attempt::Attempt;
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
+use crate::tile::{Made, Verified};
+use crate::verify::is_drawn;
+use crate::work::Work;
 use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
 
 /// A block that arrived, and what was found about it.
@@ -64,13 +67,12 @@ impl Sched {
             return;
         };
         let new = work.pixels.add(rect);
-        let image_done = work.pixels.is_complete();
         let tile = work.tile_of(rect);
         let mut tile_done = false;
         let mut purpose = Purpose::First;
         if let Some(tile) = tile.and_then(|tile| work.tiles.get_mut(tile)) {
             tile.missing -= new;
-            tile_done = tile.missing == 0;
+            tile_done = tile.missing == 0 && tile.check.is_none();
             if tile.trouble.on_purpose {
                 purpose = Purpose::Second;
             }
@@ -100,11 +102,18 @@ impl Sched {
         if let Some(tile) = tile.filter(|_| tile_done) {
             self.tile_done(image, tile, worker, out);
         }
-        if image_done && let Some((job, place)) = self.job_and_place(image) {
+        self.finish_image(image, out);
+        self.job_changed(image.job);
+    }
+
+    /// Has an image encoded of which nothing is left to render.
+    pub(crate) fn finish_image(&mut self, image: ImageRef, out: &mut Vec<Effect>) {
+        if let Some((job, place)) = self.job_and_place(image)
+            && job.work.get(&place).is_some_and(Work::is_finished)
+        {
             job.image_is_rendered(place);
             out.push(Effect::Encode { image });
         }
-        self.job_changed(image.job);
     }
 
     /// The place of the image that a durable block belongs to; `None` where that has all its pixels.
@@ -162,6 +171,7 @@ impl Sched {
             && let Some(work) = job.work.get_mut(&index)
         {
             work.spent = work.spent.saturating_add(cost);
+            work.made_by(id);
         }
         let tally = &mut job.tally;
         tally.render_time = Span(tally.render_time.0.saturating_add(elapsed.0));
@@ -176,13 +186,21 @@ impl Sched {
         if !is_last {
             self.progress(number);
         }
-        if self.differs(number, rect, arrival.pixels) {
+        let made = Made {
+            rect,
+            pixels: arrival.pixels,
+            by: id,
+        };
+        if self.is_check(number) {
+            self.checked(number, arrival.block, made, out);
+        } else if self.differs(number, made) {
             self.incident(number, arrival.block, out);
         }
     }
 
     /// Compares a block with what the other attempt at its tile made of it, if that is known.
-    fn differs(&mut self, number: u64, rect: Rect, pixels: Digest) -> bool {
+    fn differs(&mut self, number: u64, made: Made) -> bool {
+        let verify = self.config.verify;
         let attempt = &self.attempts[number];
         let (image, tile) = (attempt.image, attempt.tile);
         let Some((job, place)) = self.job_and_place(image) else {
@@ -192,13 +210,12 @@ impl Sched {
         let Some(tile) = work.and_then(|work| work.tiles.get_mut(tile)) else {
             return false;
         };
-        let seen = tile.seen.iter().find(|(seen, _)| *seen == rect);
-        if let Some((_, digest)) = seen {
-            return *digest != pixels;
+        if let Some(seen) = tile.seen.iter().find(|seen| seen.rect == made.rect) {
+            return seen.pixels != made.pixels;
         }
-        // Only while two are at work on it can there be another one to compare it with.
-        if tile.live_count() > 1 {
-            tile.seen.push((rect, pixels));
+        // Only while two are at work on it can there be another one to compare it with, or later.
+        if tile.live_count() > 1 || is_drawn(verify, image, tile.region) {
+            tile.seen.push(made);
         }
         false
     }
@@ -228,6 +245,9 @@ impl Sched {
     /// Ends the attempts at a tile of which every pixel is durable. One that has
     /// delivered all it was leased for knows; the others are told.
     fn tile_done(&mut self, image: ImageRef, tile: u32, by: WorkerId, out: &mut Vec<Effect>) {
+        let verify = self.config.verify;
+        let kind = self.jobs.get(&image.job).map(|job| job.kind);
+        let able = kind.map_or(0, |kind| self.kinds.able(kind));
         let Some((job, place)) = self.job_and_place(image) else {
             return;
         };
@@ -238,6 +258,10 @@ impl Sched {
             return;
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
+        let is_whole = done.seen.len() == done.rect.blocks().count();
+        if able > 1 && is_whole && is_drawn(verify, image, done.region) {
+            done.verified = Verified::Due;
+        }
         let live: [Option<u64>; 2] = {
             let mut attempts = done.attempts();
             [attempts.next(), attempts.next()]

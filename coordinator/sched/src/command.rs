@@ -18,7 +18,7 @@ pub enum Command {
     Cancel,
     /// Render its failed images again.
     Retry,
-    /// Render one image again, finished or failed.
+    /// Render one image from its first pixel again, whatever became of it.
     Again(ImageNumber),
     /// Serve it before the jobs of lower priority, and after those of higher.
     Priority(i32),
@@ -54,7 +54,7 @@ impl Sched {
             Command::Cancel if is_over => {}
             Command::Cancel => self.cancel(id, out),
             Command::Retry => self.retry(id)?,
-            Command::Again(image) => self.again(id, image)?,
+            Command::Again(image) => self.again(id, image, out)?,
             Command::Remove => self.remove(id, out)?,
             _ if is_over => return Err(CommandRefusal::JobOver),
             Command::Pause => {
@@ -91,7 +91,12 @@ impl Sched {
         self.wait_again(id, &failed)
     }
 
-    fn again(&mut self, id: JobId, image: ImageNumber) -> Result<(), CommandRefusal> {
+    fn again(
+        &mut self,
+        id: JobId,
+        image: ImageNumber,
+        out: &mut Vec<Effect>,
+    ) -> Result<(), CommandRefusal> {
         let job = &self.jobs[&id];
         let place = job
             .place(image)
@@ -99,7 +104,15 @@ impl Sched {
         match job.state(place) {
             ImageState::Encoded { .. } | ImageState::Failed => self.wait_again(id, &[place]),
             _ if job.is_over() => Err(CommandRefusal::JobCancelled),
-            _ => Err(CommandRefusal::ImageUnfinished { image }),
+            ImageState::Rendering | ImageState::Encoding => {
+                let image = job.image_ref(place);
+                self.drop_work(image, RevokeReason::RenderedAgain, out);
+                if let Some(job) = self.jobs.get_mut(&id) {
+                    job.wait_again(place);
+                }
+                Ok(())
+            }
+            ImageState::Waiting | ImageState::Dropped => Ok(()),
         }
     }
 

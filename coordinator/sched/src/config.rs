@@ -47,6 +47,8 @@ pub struct Config {
     pub aside: Span,
     /// A worker whose time is limited gets a tile of a job of which nothing is measured only where it has so much left.
     pub unmeasured_needs: Span,
+    /// Of a million tiles, so many are rendered once more by another worker, and compared. 0 is none.
+    pub verify: u32,
     /// Most tiles of one image, whoever chooses their shape.
     pub max_array_size: u64,
     /// Images of one job that are rendered or encoded at a time, at most…
@@ -134,6 +136,7 @@ impl Config {
             jobs_aside_max: 2,
             aside: Span::from_secs(300),
             unmeasured_needs: Span::from_secs(30),
+            verify: 0,
             max_array_size: 75_000,
             images_in_flight_max: 256,
             pixels_in_flight_max: 1 << 26,

@@ -116,6 +116,13 @@ pub enum Effect {
         /// The worker of the other attempt, where that is still live.
         other: Option<WorkerId>,
     },
+    /// A worker made wrong pixels, and some of this image is of its making: commit and feed [`crate::Command::Again`].
+    RenderAgain {
+        /// The image.
+        image: ImageRef,
+        /// The worker.
+        worker: WorkerId,
+    },
     /// Remove an image's scratch file and stop encoding it: nobody wants what is there.
     ///
     /// The image may be begun anew later. Of what was accepted for it before this, nothing is
@@ -179,6 +186,8 @@ pub enum RevokeReason {
     CalledBack,
     /// Its pixels differ from those of another attempt.
     Differs,
+    /// The image is rendered again from its first pixel.
+    RenderedAgain,
     /// The image failed.
     ImageFailed,
     /// No block for longer than the progress limit.

@@ -74,6 +74,7 @@ impl Job {
     pub(crate) fn image_is_rendered(&mut self, place: u32) {
         if let Some(work) = self.work.remove(&place) {
             self.spread.note(work.spent);
+            self.remember_makers(place, work.makers);
         }
         self.set_state(place, ImageState::Encoding);
     }

@@ -6,7 +6,7 @@ use alloc::sync::Arc;
 use alloc::vec;
 use alloc::vec::Vec;
 
-use model::{ImageNumber, ImageRef, JobId, Rect, Span, Timestamp};
+use model::{ImageNumber, ImageRef, JobId, Rect, Span, Timestamp, WorkerId};
 
 use crate::costs::Costs;
 use crate::market::{Rank, Stage};
@@ -46,6 +46,8 @@ pub(crate) struct Job {
     encoding: BTreeSet<u32>,
     pub(crate) failures: Vec<ImageFailure>,
     pub(crate) tally: Tally,
+    /// Who rendered the latest images that are rendered.
+    pub(crate) makers: BTreeMap<u32, Vec<WorkerId>>,
     pub(crate) costs: Costs,
     pub(crate) spread: Spread,
     /// Attempts that are their tile's only one, by when they are expected to be done.
@@ -116,6 +118,7 @@ impl Job {
                 submitted,
                 ..Tally::default()
             },
+            makers: BTreeMap::new(),
             costs: Costs::unknown(spec.window),
             spread: Spread::default(),
             ending: BTreeSet::new(),
@@ -291,6 +294,7 @@ impl Job {
         }
         let image = self.image_ref(place).image;
         self.failures.retain(|failure| failure.image != image);
+        self.makers.remove(&place);
         self.set_state(place, ImageState::Waiting);
     }
 

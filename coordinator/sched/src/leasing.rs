@@ -153,6 +153,9 @@ impl Sched {
             let image = job.image_ref(place);
             self.lease_tile(worker, (image, tile), Purpose::First, out);
         }
+        if self.config.verify > 0 {
+            self.finish_what_is_not_checked(job_id, out);
+        }
         self.job_changed(job_id);
         self.settle_job(job_id);
         tile.is_some()

@@ -49,6 +49,7 @@ mod tail;
 mod tile;
 mod tiling;
 mod timers;
+mod verify;
 mod view;
 mod why;
 mod work;

@@ -269,11 +269,6 @@ pub enum CommandRefusal {
         /// Which.
         image: ImageNumber,
     },
-    /// The image is still to be finished for the first time.
-    ImageUnfinished {
-        /// Which.
-        image: ImageNumber,
-    },
     /// Another job waits for this one to be finished.
     WaitedFor {
         /// Which.
@@ -299,12 +294,6 @@ impl fmt::Display for CommandRefusal {
             Self::JobCancelled => f.write_str("the job was cancelled: submit it again"),
             Self::NothingFailed => f.write_str("no frame of the job has failed"),
             Self::UnknownImage { image } => write!(f, "the job has no frame {image}"),
-            Self::ImageUnfinished { image } => {
-                write!(
-                    f,
-                    "frame {image} is not finished yet, so it is rendered anyway"
-                )
-            }
             Self::WaitedFor { by } => {
                 write!(f, "job {by} waits for this one: cancel it first")
             }

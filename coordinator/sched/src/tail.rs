@@ -151,6 +151,9 @@ impl Sched {
         let job = self.jobs.get(&image.job)?;
         let work = job.work.get(&job.place(image.image)?)?;
         let tile = work.tiles.get(tile).filter(|_| !work.given_up)?;
+        if tile.check.is_some() {
+            return None;
+        }
         let is_missing = |block: &Rect| !work.pixels.covers(*block);
         let missing: Vec<Rect> = tile.rect.blocks().filter(is_missing).collect();
         let blocks = missing.len() as u64;

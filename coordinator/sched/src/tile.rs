@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 use model::{Digest, Rect, WorkerId};
 
 use crate::region::Region;
+use crate::verify::Check;
 
 /// Most live attempts of one tile.
 pub(crate) const LIVE_MAX: usize = 2;
@@ -18,8 +19,28 @@ pub(crate) struct Tile {
     pub(crate) missing: u64,
     pub(crate) trouble: Trouble,
     live: [Option<u64>; LIVE_MAX],
-    /// Blocks that arrived since it was leased a second time, and the digest of their pixels.
-    pub(crate) seen: Vec<(Rect, Digest)>,
+    /// Blocks that arrived and may be compared with another rendering of them.
+    pub(crate) seen: Vec<Made>,
+    /// What becomes of it when it is done.
+    pub(crate) verified: Verified,
+    /// Where it is rendered once more: what it is held against.
+    pub(crate) check: Option<Check>,
+}
+
+/// A block as somebody made it.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) struct Made {
+    pub(crate) rect: Rect,
+    pub(crate) pixels: Digest,
+    pub(crate) by: WorkerId,
+}
+
+/// Whether a tile that is done is rendered once more by somebody else.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Verified {
+    No,
+    /// As soon as somebody can.
+    Due,
 }
 
 /// What went wrong with some pixels; it stays with them however they are cut.
@@ -44,6 +65,20 @@ impl Tile {
             trouble,
             live: [None; LIVE_MAX],
             seen: Vec::new(),
+            verified: Verified::No,
+            check: None,
+        }
+    }
+
+    /// Pixels that are all durable, to be rendered once more.
+    pub(crate) fn to_check(region: Region, rect: Rect, check: Check) -> Self {
+        let trouble = Trouble {
+            on_purpose: true,
+            ..Trouble::default()
+        };
+        Self {
+            check: Some(check),
+            ..Self::new(region, rect, 0, trouble)
         }
     }
 
@@ -131,6 +166,10 @@ impl Tiles {
         let tile = self.rows.get_mut(number as usize)?.take()?;
         self.free.push(number);
         Some(tile)
+    }
+
+    pub(crate) fn is_empty(&self) -> bool {
+        self.rows.len() == self.free.len()
     }
 
     pub(crate) fn iter(&self) -> impl Iterator<Item = (u32, &Tile)> {

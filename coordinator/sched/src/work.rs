@@ -15,8 +15,9 @@ use model::{Rect, WorkerId};
 use crate::costs::CostMap;
 use crate::pixels::PixelsDone;
 use crate::region::Region;
-use crate::tile::{Tile, Tiles, Trouble};
+use crate::tile::{Tile, Tiles, Trouble, Verified};
 use crate::tiling::TileGrid;
+use crate::verify::Check;
 
 /// The mark of a cell that is part of no tile.
 const NO_TILE: u32 = u32::MAX;
@@ -42,6 +43,10 @@ pub(crate) struct Work {
     pieces: BTreeMap<Order, Piece>,
     /// Pieces at which some worker failed, in the order in which they did.
     troubled: VecDeque<Piece>,
+    /// What is done and is to be rendered once more, by somebody else.
+    checks: VecDeque<(Region, Check)>,
+    /// Who rendered some of it.
+    pub(crate) makers: Vec<WorkerId>,
     /// Tiles that are open to a second attempt, because the worker of the first is away.
     shared: BTreeSet<u32>,
     /// Of all pieces.
@@ -94,6 +99,8 @@ impl Work {
             cells: vec![NO_TILE; count],
             pieces: BTreeMap::new(),
             troubled: VecDeque::new(),
+            checks: VecDeque::new(),
+            makers: Vec::new(),
             shared: BTreeSet::new(),
             open: Amount::default(),
         };
@@ -106,7 +113,10 @@ impl Work {
 
     /// Whether any tile or piece waits for a worker.
     pub(crate) fn has_open(&self) -> bool {
-        let waits = !self.shared.is_empty() || !self.pieces.is_empty() || !self.troubled.is_empty();
+        let waits = !self.shared.is_empty()
+            || !self.pieces.is_empty()
+            || !self.troubled.is_empty()
+            || !self.checks.is_empty();
         waits && !self.given_up
     }
 
@@ -131,7 +141,8 @@ impl Work {
         !self.given_up
             && (self.shared_for(ask).is_some()
                 || self.troubled_for(ask).is_some()
-                || self.piece_for(ask).is_some())
+                || self.piece_for(ask).is_some()
+                || self.check_for(ask).is_some())
     }
 
     /// The tile of which this worker is to make an attempt.
@@ -144,10 +155,21 @@ impl Work {
             let cheap = self.wants_cheap(ask);
             let piece = match self.troubled_for(ask) {
                 Some(index) => self.troubled.remove(index),
-                None => {
-                    let order = self.piece_for(ask)?;
-                    self.pieces.remove(&order)
-                }
+                None => match self.piece_for(ask) {
+                    Some(order) => self.pieces.remove(&order),
+                    None => {
+                        let place = self.check_for(ask)?;
+                        let (region, check) = self.checks.remove(place)?;
+                        if check.is_by(ask.worker) {
+                            // Nobody else is there: nothing can be said about it.
+                            continue;
+                        }
+                        let rect = region.rect(self.grid);
+                        let tile = self.tiles.insert(Tile::to_check(region, rect, check));
+                        self.mark(region, tile);
+                        return Some(tile);
+                    }
+                },
             }?;
             let amount = self.amount(piece.region);
             self.open.pixels -= amount.pixels;
@@ -240,6 +262,13 @@ impl Work {
         let first = self.troubled.iter().take(LOOKED_AT_MAX);
         first.into_iter().position(|piece| {
             piece.trouble.suits(ask.worker, ask.able) && self.fits_smallest(piece.region, ask)
+        })
+    }
+
+    /// What this worker may render once more, or let be where nobody else is there to do it.
+    fn check_for(&self, ask: &Ask) -> Option<usize> {
+        self.checks.iter().position(|(region, check)| {
+            check.suits(ask.worker, ask.able) && self.fits(*region, ask)
         })
     }
 
@@ -350,15 +379,18 @@ impl Work {
 
     /// Lets a tile that nobody renders wait again.
     pub(crate) fn reopen(&mut self, tile: u32) {
-        if let Some(Tile {
-            region,
-            trouble,
-            missing,
-            ..
-        }) = self.close(tile)
-            && missing > 0
-        {
+        let Some(tile) = self.close(tile) else {
+            return;
+        };
+        let Tile {
+            region, trouble, ..
+        } = tile;
+        if tile.missing > 0 {
             self.put(Piece { region, trouble });
+        } else if let Some(check) = tile.check {
+            self.checks.push_back((region, check));
+        } else if tile.verified == Verified::Due {
+            self.checks.push_back((region, Check::of(tile.seen)));
         }
     }
 
@@ -372,7 +404,12 @@ impl Work {
 
     /// Opens a tile to a second attempt, or no more.
     pub(crate) fn share(&mut self, tile: u32, shared: bool) {
-        if shared {
+        // Who helped with a check might have made what it checks.
+        let checks = self
+            .tiles
+            .get(tile)
+            .is_some_and(|tile| tile.check.is_some());
+        if shared && !checks {
             self.shared.insert(tile);
         } else {
             self.shared.remove(&tile);
@@ -388,6 +425,18 @@ impl Work {
         self.focus = focus;
         for piece in core::mem::take(&mut self.pieces).into_values() {
             self.pieces.insert(self.order(piece.region), piece);
+        }
+    }
+
+    /// Whether every pixel is durable, and nothing is to be rendered once more.
+    pub(crate) fn is_finished(&self) -> bool {
+        self.pixels.is_complete() && self.checks.is_empty() && self.tiles.is_empty()
+    }
+
+    /// Notes who rendered some of it.
+    pub(crate) fn made_by(&mut self, worker: WorkerId) {
+        if !self.makers.contains(&worker) {
+            self.makers.push(worker);
         }
     }
 
@@ -429,7 +478,10 @@ impl Work {
             let mut cells = tile.region.indices(self.grid);
             assert!(cells.all(|cell| self.cells[cell] == number));
             assert_eq!(tile.missing, self.missing(tile.rect));
-            assert!(tile.missing > 0, "a tile that is done is forgotten");
+            assert!(
+                (tile.missing > 0) != tile.check.is_some(),
+                "a tile that is done is forgotten, or rendered once more"
+            );
             assert!(tile.live_count() > 0, "somebody renders a tile");
             pixels += tile.rect.area();
         }
@@ -452,6 +504,11 @@ impl Work {
                 .iter()
                 .all(|&tile| self.tiles.get(tile).is_some())
         );
-        assert!(!self.pixels.is_complete(), "a complete image is encoded");
+        for (region, _) in &self.checks {
+            let mut cells = region.indices(self.grid);
+            assert!(cells.all(|cell| self.cells[cell] == NO_TILE));
+            assert_eq!(self.missing(region.rect(self.grid)), 0, "it was done");
+        }
+        assert!(!self.is_finished(), "a complete image is encoded");
     }
 }

@@ -138,13 +138,16 @@ fn one_image_is_rendered_again_whatever_became_of_it() {
     let again = |image| Command::Again(ImageNumber(image));
     farm.command(again(1));
     assert_eq!(leased_jobs(&farm.never_mind()), [1, 1]);
-    let image = ImageNumber(1);
-    farm.command(again(1))
-        .wants(&[refused(1, CommandRefusal::ImageUnfinished { image })]);
+    // One that is begun begins anew.
+    farm.command(again(1));
+    let effects = farm.never_mind();
+    assert!(effects.contains(&revoke(1, 5, RevokeReason::RenderedAgain)));
+    assert!(effects.contains(&drop_scratch(1)));
+    assert_eq!(leased_jobs(&effects), [1, 1]);
     let image = ImageNumber(2);
     farm.command(again(2))
         .wants(&[refused(1, CommandRefusal::UnknownImage { image })]);
-    farm.stores_tile(1, 5, 1, 0).stores_tile(1, 6, 1, 1);
+    farm.stores_tile(1, 7, 1, 0).stores_tile(1, 8, 1, 1);
     farm.never_mind();
     // The other image is still failed.
     farm.encoded(1).wants(&[done(JobOutcome::Failed)]);

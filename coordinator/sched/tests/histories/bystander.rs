@@ -82,7 +82,13 @@ impl Bystander {
         let missing: Vec<Rect> = lease.tile.blocks().filter(missing).collect();
         let mut blocks: Vec<Rect> = lease.blocks().collect();
         blocks.sort_by_key(|block| (block.y0, block.x0));
-        assert_eq!(blocks, missing, "exactly what is missing is leased");
+        let all: Vec<Rect> = lease.tile.blocks().collect();
+        let is_check = missing.is_empty();
+        assert_eq!(
+            blocks,
+            if is_check { all } else { missing },
+            "exactly what is missing is leased, or all of a tile to check it"
+        );
         let before = self.leases.insert(lease.attempt, (worker, lease));
         assert_eq!(before, None, "an attempt is leased once");
     }

@@ -1,7 +1,7 @@
 //! A scheduler that is told events, one after the other, beside a twin and a bystander.
 
 use model::{Begun, Span, Timestamp, WorkerId};
-use sched::{Config, Effect, Event, Sched};
+use sched::{Command, Config, Effect, Event, Sched};
 
 use crate::bystander::Bystander;
 use crate::situation::EPOCH;
@@ -21,6 +21,8 @@ pub(crate) struct History {
 pub(crate) fn config() -> Config {
     Config {
         images_in_flight_max: 2,
+        // A third of all tiles.
+        verify: 333_333,
         aside: Span::from_secs(20),
         ..Config::new(EPOCH)
     }
@@ -55,10 +57,15 @@ impl History {
         }
         let mut given_up = Vec::new();
         for effect in effects {
-            if let Effect::GiveUp { image, reason } = effect {
-                given_up.push(Event::ImageFailed { image, reason });
-            } else {
-                self.seen.hear(&self.sched, effect);
+            match effect {
+                Effect::GiveUp { image, reason } => {
+                    given_up.push(Event::ImageFailed { image, reason });
+                }
+                Effect::RenderAgain { image, .. } => given_up.push(Event::Command {
+                    job: image.job,
+                    command: Command::Again(image.image),
+                }),
+                effect => self.seen.hear(&self.sched, effect),
             }
         }
         self.seen.check(&self.sched);
