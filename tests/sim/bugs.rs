@@ -55,3 +55,8 @@ fn lease_never_ending() {
 fn unbounded_queue() {
     is_caught(Bug::UnboundedQueue, "blocks that wait are bounded");
 }
+
+#[test]
+fn waiting_forgotten() {
+    is_caught(Bug::NoPatience, "jobs that wait are not begun");
+}

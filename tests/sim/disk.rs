@@ -41,8 +41,10 @@ struct File {
 
 /// The pixel that belongs there.
 fn right(image: ImageRef, x: u32, y: u32) -> u8 {
-    let mixed = image.job.0 * 31 + u64::from(image.image.0) * 7 + u64::from(x / 4 + y / 4 * 5);
-    1 + u8::try_from(mixed % 250).expect("it is small")
+    let of_image = (image.job.0 * 31 + u64::from(image.image.0) * 7) % 250;
+    let of_image = u32::try_from(of_image).expect("it is small");
+    let mixed = (of_image + x / 4 + y / 4 * 5) % 250;
+    1 + u8::try_from(mixed).expect("it is small")
 }
 
 fn index(x: u32, y: u32) -> usize {
@@ -64,8 +66,9 @@ impl Disk {
             unsynced: Vec::new(),
         });
         for y in rect.y0..rect.y1 {
-            for x in rect.x0..rect.x1 {
-                file.now[index(x, y)] = match pixels {
+            let row = &mut file.now[index(rect.x0, y)..];
+            for (x, pixel) in (rect.x0..rect.x1).zip(row) {
+                *pixel = match pixels {
                     Pixels::Right => right(image, x, y),
                     Pixels::Wrong => WRONG,
                 };

@@ -1,9 +1,10 @@
 //! A whole farm in one thread: the scheduler, its store and disk, several sessions, and a simulated
 //! network, clock and processor, all from one key.
 //!
-//! Messages are late and come twice; links are cut; workers are killed, frozen, cut off, drained,
-//! stopped, slow and wrong, and their clocks jump and stand still; the coordinator is frozen, its clock jumps, its disk is full, its machine crashes and loses, tears
-//! and reorders whatever was not synced; users change their minds. However that goes, every job ends by itself,
+//! Messages are late and come twice; links are cut; workers are killed, frozen, cut off, drained, stopped, slow and
+//! wrong, and their clocks jump and stand still; the coordinator is frozen, its clock jumps, its disk is full, its
+//! machine crashes and loses, tears and reorders whatever was not synced; jobs wait for others, and users change
+//! their minds. However that goes, every job ends by itself, none begins before those that it waits for,
 //! every frame is whole and right, nothing acknowledged is rendered again, every lease ends and every queue is bounded.
 //!
 //! A failure names its key and the smallest farm that fails with it; `replay` shows that again.

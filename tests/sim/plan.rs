@@ -117,6 +117,8 @@ pub(crate) enum Bug {
     EndlessLease,
     /// Blocks are taken however many wait for the disk.
     UnboundedQueue,
+    /// The scheduler is not told what a job waits for.
+    NoPatience,
 }
 
 /// A farm.

@@ -21,6 +21,8 @@ pub(crate) struct User {
 #[derive(Debug)]
 struct Job {
     submission: Submission,
+    /// Its jobs that this one is to wait for, by their places.
+    after: Vec<usize>,
     /// Its number, once that was heard.
     job: Option<JobId>,
     /// Whether it is wanted no more.
@@ -29,13 +31,17 @@ struct Job {
 
 impl User {
     pub(crate) fn new(plan: &Plan, random: &mut Random) -> Self {
-        let jobs = (0..plan.jobs).map(|number| Job {
-            submission: submission(number, plan.images, random),
-            job: None,
-            is_removed: false,
-        });
+        let mut jobs: Vec<Job> = Vec::new();
+        for number in 0..plan.jobs {
+            jobs.push(Job {
+                submission: submission(number, plan.images, random),
+                after: (0..jobs.len()).filter(|_| random.below(3) == 0).collect(),
+                job: None,
+                is_removed: false,
+            });
+        }
         Self {
-            jobs: jobs.collect(),
+            jobs,
             wishes: 0,
             is_honest: plan.troubles.liars == 0,
         }
@@ -71,8 +77,13 @@ impl User {
         let mut events = Vec::new();
         for job in &self.jobs {
             let Some(id) = job.job else {
-                if random.below(3) == 0 {
-                    events.push(Event::Submit(job.submission.clone()));
+                if let Some(after) = self.after(job, sched)
+                    && random.below(3) == 0
+                {
+                    events.push(Event::Submit(Submission {
+                        after,
+                        ..job.submission.clone()
+                    }));
                 }
                 continue;
             };
@@ -85,6 +96,16 @@ impl User {
             if view.is_some_and(|view| view.paused == Paused::Yes) && random.below(20) == 0 {
                 want(Command::Resume);
             }
+            let is_cancelled = |before: &JobId| {
+                let cancelled = JobState::Over(JobOutcome::Cancelled);
+                sched
+                    .job(*before)
+                    .is_some_and(|view| view.state == cancelled)
+            };
+            let is_in_vain = view.is_some_and(|view| view.after.iter().any(is_cancelled));
+            if is_in_vain && random.below(8) == 0 {
+                want(Command::Cancel);
+            }
             let failed = JobState::Over(JobOutcome::Failed);
             if view.is_some_and(|view| view.state == failed) && random.below(8) == 0 {
                 want(Command::Retry);
@@ -92,13 +113,22 @@ impl User {
         }
         if wishes && self.wishes < WISHES_MAX {
             self.wishes += 1;
-            events.extend(self.wish(random));
+            events.extend(self.wish(sched, random));
         }
         events
     }
 
-    fn wish(&mut self, random: &mut Random) -> Option<Event> {
+    /// The jobs that one waits for, but for those that are gone; nothing where the number of one is not heard yet.
+    fn after(&self, job: &Job, sched: &Sched) -> Option<Vec<JobId>> {
+        let numbers = job.after.iter().map(|&place| self.jobs[place].job);
+        let mut numbers = numbers.collect::<Option<Vec<JobId>>>()?;
+        numbers.retain(|&number| sched.job(number).is_some());
+        Some(numbers)
+    }
+
+    fn wish(&mut self, sched: &Sched, random: &mut Random) -> Option<Event> {
         let index = usize::try_from(random.below(self.jobs.len() as u64)).expect("it is small");
+        let is_waited_for = self.jobs.iter().any(|job| job.after.contains(&index));
         let wanted = &mut self.jobs[index];
         let job = wanted.job?;
         let frames = wanted.submission.frames;
@@ -116,6 +146,12 @@ impl User {
             12 => Command::Focus(None),
             13..15 => Command::Retry,
             15..18 => {
+                // Not where another one has waited for it: the store keeps what that was submitted to wait for, and
+                // after a restart it would wait again, though it may have begun.
+                let finished = JobState::Over(JobOutcome::Finished);
+                if is_waited_for && sched.job(job)?.state == finished {
+                    return None;
+                }
                 let place =
                     u32::try_from(random.below(frames.count().into())).expect("it is small");
                 Command::Again(frames.nth(place)?)

@@ -32,6 +32,10 @@ pub(crate) struct Witness {
     /// The scheduler before the last crash, where it had nothing to commit.
     pub(crate) before: Option<Sched>,
     placed: BTreeMap<(u64, ImageRef, u32), u32>,
+    /// What each job was submitted to wait for.
+    after: BTreeMap<JobId, Vec<JobId>>,
+    /// Jobs that were finished, at least once in this epoch.
+    finished: BTreeSet<JobId>,
 }
 
 impl Witness {
@@ -56,6 +60,21 @@ impl Witness {
         self.adopted += 1;
     }
 
+    pub(crate) fn waits(&mut self, job: JobId, after: &[JobId]) {
+        self.after.insert(job, after.to_vec());
+    }
+
+    pub(crate) fn finishes(&mut self, job: JobId) {
+        self.finished.insert(job);
+    }
+
+    /// Nothing is leased of a job before those that it waits for were finished.
+    pub(crate) fn check_begun(&self, job: JobId) {
+        let mut before = self.after.get(&job).into_iter().flatten();
+        let is_finished = before.all(|before| self.finished.contains(before));
+        assert!(is_finished, "{job:?}: jobs that wait are not begun");
+    }
+
     pub(crate) fn image_of(&self, attempt: AttemptId) -> Option<ImageRef> {
         self.leased.get(&attempt).map(|&(_, image)| image)
     }
@@ -76,6 +95,9 @@ impl Witness {
         self.jobs.remove(&job);
         self.cancelled.remove(&job);
         self.encoded.retain(|image| image.job != job);
+        for after in self.after.values_mut() {
+            after.retain(|&before| before != job);
+        }
         self.pixels.retain(|image, _| image.job != job);
     }
 
@@ -105,10 +127,22 @@ impl Witness {
     /// Attempts of another epoch are dead until they are taken up, and what they were leased is of no interest.
     pub(crate) fn crash(&mut self) {
         self.leased.clear();
+        self.finished.clear();
     }
 
     /// Holds a scheduler that was told what the store recalls against what was promised.
     pub(crate) fn compare(&mut self, sched: &Sched, recalled: &Recalled) {
+        self.after.clear();
+        for job in &recalled.jobs {
+            let mut after = job.submission.after.clone();
+            after.retain(|&before| sched.job(before).is_some());
+            self.after.insert(job.job, after);
+        }
+        for job in sched.jobs() {
+            if job.state == JobState::Over(JobOutcome::Finished) {
+                self.finished.insert(job.job);
+            }
+        }
         for &job in &self.jobs {
             let state = sched.job(job).map(|job| job.state);
             assert!(state.is_some(), "{job:?}: a job that was taken is there");

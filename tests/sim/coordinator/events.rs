@@ -1,12 +1,13 @@
 //! What the scheduler is told, and what of it is durable.
 
 use model::{ImageRef, Span, Timestamp};
-use sched::{Command, Effect, Event, ImageState, Sched};
+use sched::{Command, Effect, Event, ImageState, JobOutcome, Sched};
 use store::Entry;
 
 use super::Coordinator;
 use super::effects::Held;
 use super::writer::Order;
+use crate::plan::Bug;
 
 /// Effects that wait for a commit.
 const HELD_MAX: usize = 4_000;
@@ -16,9 +17,14 @@ const CHECK_EVERY: u64 = 64;
 
 impl Coordinator {
     /// Tells the scheduler; where the event is durable, what it wants waits for the commit.
-    pub(crate) fn tell(&mut self, now: Timestamp, event: Event) {
+    pub(crate) fn tell(&mut self, now: Timestamp, mut event: Event) {
         self.events += 1;
         let told = event.clone();
+        if let Event::Submit(submission) = &mut event
+            && self.plan.bug == Some(Bug::NoPatience)
+        {
+            submission.after.clear();
+        }
         let mut effects = Vec::new();
         let is_known = |sched: &Sched, event: &Event| match event {
             Event::Submit(spec) => sched.submitted(spec.submission).is_some(),
@@ -30,10 +36,21 @@ impl Coordinator {
         if self.events.is_multiple_of(CHECK_EVERY) {
             self.sched.check_invariants();
         }
+        if !was_known
+            && let Event::Submit(submission) = &told
+            && let Some(job) = self.sched.submitted(submission.submission)
+        {
+            self.witness.waits(job, &submission.after);
+        }
         for effect in &effects {
             match effect {
                 Effect::DropScratch { image } => self.end_era(*image),
                 Effect::ForgetJob { job } => self.witness.forget_job(*job),
+                Effect::JobDone {
+                    job,
+                    outcome: JobOutcome::Finished,
+                } => self.witness.finishes(*job),
+                Effect::Lease { lease, .. } => self.witness.check_begun(lease.image.job),
                 _ => {}
             }
         }
