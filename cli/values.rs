@@ -83,6 +83,27 @@ pub(crate) fn memory(text: &str) -> Result<u64, String> {
         .ok_or_else(form)
 }
 
+/// A part of a whole in per cent, such as 0.5; in millionths.
+pub(crate) fn percent(text: &str) -> Result<u32, String> {
+    let form = || format!("`{text}` is no part of a hundred: write it as 0.5, or 100 for all");
+    let digits = text.trim().trim_end_matches('%').trim_end();
+    let (whole, part) = digits.split_once('.').unwrap_or((digits, ""));
+    let is_digits = |text: &str| text.chars().all(|letter| letter.is_ascii_digit());
+    if whole.is_empty()
+        || whole.len() > 3
+        || part.len() > 4
+        || !is_digits(whole)
+        || !is_digits(part)
+    {
+        return Err(form());
+    }
+    let millionths: u32 = format!("{whole}{part:0<4}").parse().map_err(|_| form())?;
+    match millionths {
+        0..=1_000_000 => Ok(millionths),
+        _ => Err(form()),
+    }
+}
+
 /// A label of workers: 1 to 64 bytes of letters, digits, `-`, `_`, `.`.
 pub(crate) fn label(text: &str) -> Result<String, String> {
     let may_be = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
@@ -195,6 +216,12 @@ mod tests {
         assert_eq!(memory("4GiB"), Ok(4 << 30));
         for wrong in ["4", "0 GiB", "4 GB", "99999999999999 TiB", ""] {
             assert!(memory(wrong).is_err(), "{wrong}");
+        }
+        assert_eq!(percent("0.5"), Ok(5_000));
+        assert_eq!(percent("100 %"), Ok(1_000_000));
+        assert_eq!(percent("0"), Ok(0));
+        for wrong in ["", "-1", "100.1", "1.23456", "half", "1e2", "."] {
+            assert!(percent(wrong).is_err(), "{wrong}");
         }
         assert_eq!(label("big-mem.2"), Ok("big-mem.2".to_owned()));
         for wrong in ["", "a b", "é", &"x".repeat(65)] {

@@ -24,6 +24,11 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "TIME", default_value = "4 s", value_parser = values::span)]
     liveness: Span,
 
+    /// How many tiles of a hundred are rendered once more by another worker and compared to the bit; a worker whose pixels are
+    /// wrong is found, and what it made is rendered again. 0 is none.
+    #[arg(long, value_name = "PERCENT", default_value = "0.5", value_parser = values::percent)]
+    verify: u32,
+
     /// A program to run whenever a job is over; its environment names the job: FLYBY_JOB, FLYBY_JOB_NAME,
     /// FLYBY_JOB_STATE (done, failed or cancelled), FLYBY_JOB_FRAMES, FLYBY_JOB_FRAMES_DONE, FLYBY_JOB_FRAMES_FAILED and
     /// FLYBY_JOB_FOLDER, where its frames are.
@@ -42,6 +47,7 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         liveness_limit: options.liveness,
         // Four heartbeats may be missed, and one a second is enough.
         heartbeat_interval: Span((options.liveness.0 / 4).clamp(1_000, 1_000_000)),
+        verify: options.verify,
         on_job_end: options.on_job_end.as_deref().map(program).transpose()?,
         ..usual
     };

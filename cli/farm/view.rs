@@ -54,7 +54,7 @@ pub(crate) struct Job {
     pub(crate) blocks_again: u64,
     /// Pixels in them.
     pub(crate) pixels_again: u64,
-    /// Of those blocks, how many were rendered twice on purpose, near the end.
+    /// Blocks that were rendered twice on purpose, to be verified or near the end; not among those.
     pub(crate) blocks_twice: u64,
     /// Blocks of which two renderings differed.
     pub(crate) incidents: u64,

@@ -1,7 +1,7 @@
 //! A job's place among others: what it asks of workers, whom it waits for, its share, what comes first.
 
 use crate::harness::Farm;
-use crate::harness::scenes::{FLYBY, TINY};
+use crate::harness::scenes::{FLYBY, TINY, slow};
 
 fn submit(farm: &Farm, options: &[&str]) -> u64 {
     farm.submit(&[&[FLYBY, "--frames", "0"], &TINY[..], options].concat())
@@ -78,6 +78,21 @@ fn share_and_focus_are_kept_and_shown() {
     assert!(farm.job(job).0["focus"].is_null());
     farm.flyby(["job", "share", &name, "0"]).refused(2, &["0"]);
     farm.flyby(["job", "focus", &name]).refused(2, &["RECT"]);
+}
+
+#[test]
+fn tiles_are_verified_by_another_worker_and_their_pixels_are_the_same() {
+    let mut farm = Farm::new(&["--verify", "100"]);
+    farm.worker(&["--threads", "1"]);
+    farm.worker(&["--threads", "1"]);
+    farm.wait_connected(2);
+    let job = farm.submit(&slow().with(&[FLYBY, "--tile", "100x75"]));
+    let done = farm.wait_done(job);
+    assert_eq!(done.film_digests(), slow().digests);
+    // Every block came twice, but for tiles that both had a part in near the end.
+    let (blocks, twice) = (done.number("blocks_done"), done.number("blocks_twice"));
+    assert!(2 * twice >= blocks && twice <= 2 * blocks, "{done:?}");
+    assert_eq!(done.number("incidents"), 0, "{done:?}");
 }
 
 #[test]

@@ -57,6 +57,8 @@ pub(crate) struct Farm {
     links: BTreeMap<WorkerId, u64>,
     links_made: u64,
     incarnations: u64,
+    /// Workers that make wrong pixels, of all there ever were.
+    liars: u64,
     /// By time, then as they were planned.
     agenda: BTreeMap<(Timestamp, u64), Happening>,
     planned: u64,
@@ -86,6 +88,7 @@ impl Farm {
             links: BTreeMap::new(),
             links_made: 0,
             incarnations: 0,
+            liars: 0,
             agenda: BTreeMap::new(),
             planned: 0,
             now: Timestamp(0),
@@ -265,8 +268,23 @@ impl Farm {
         let pace = Span::from_millis(20 + self.random.below(400)).times(slower);
         let mut worker = Worker::new(self.now, id, threads, pace);
         worker.lies = self.random.happens(self.troubles.liars);
+        self.liars += u64::from(worker.lies);
         self.workers.insert(id, worker);
         self.plan(after, Happening::Start(id));
+    }
+
+    /// One liar among at least two others is found where every tile is verified, or where it was
+    /// found at all: no frame that stays has a wrong pixel.
+    pub(crate) fn check_frames(&self, plan: &Plan) {
+        let is_alone = self.liars == 1 && plan.workers > 2;
+        let is_found = plan.verify == 1_000_000 || self.coordinator.witness.convicted > 0;
+        if is_alone && is_found {
+            assert_eq!(
+                self.coordinator.wrong_frames(),
+                0,
+                "a liar's pixels are not kept"
+            );
+        }
     }
 
     fn tell_worker(&mut self, id: WorkerId, event: Event) {

@@ -89,6 +89,27 @@ fn wrong_pixels_are_noticed_where_a_tile_is_rendered_twice() {
 }
 
 #[test]
+fn a_liar_among_others_is_found_and_no_frame_of_its_making_stays() {
+    let troubles = Troubles {
+        liars: 150,
+        slow: 200,
+        ..Troubles::NONE
+    };
+    for share in [1_000_000, 200_000] {
+        let report = all(0..60, |key| {
+            let plan = Plan::new(key, troubles);
+            Plan {
+                verify: share,
+                workers: plan.workers.max(3),
+                images: 3 * plan.images,
+                ..plan
+            }
+        });
+        assert!(report.convicted > 0, "{share}: {report:?}");
+    }
+}
+
+#[test]
 #[ignore = "long: tests/run --all"]
 fn everything_at_once_for_long() {
     let keys = number_from("FLYBY_SIM_KEYS").unwrap_or(1_000);

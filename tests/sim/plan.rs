@@ -129,6 +129,8 @@ pub(crate) struct Plan {
     pub(crate) jobs: u64,
     /// Of the longest job.
     pub(crate) images: u64,
+    /// Of a million tiles, so many are rendered once more.
+    pub(crate) verify: u32,
     pub(crate) troubles: Troubles,
     pub(crate) bug: Option<Bug>,
 }
@@ -142,6 +144,7 @@ impl Plan {
             workers: 1 + random.below(5),
             jobs: 1 + random.below(3),
             images: 1 + random.below(6),
+            verify: 30_000,
             troubles,
             bug: None,
         }

@@ -21,6 +21,8 @@ pub(crate) struct Report {
     pub(crate) restarts: u64,
     /// Tiles that workers went on with after one.
     pub(crate) adopted: u64,
+    /// Images that are rendered again since a worker made wrong pixels.
+    pub(crate) convicted: u64,
 }
 
 /// Runs one farm; what broke where something did.
@@ -28,12 +30,14 @@ pub(crate) fn one(plan: Plan) -> Result<Report, String> {
     let run = || {
         let mut farm = Farm::new(plan);
         farm.run();
+        farm.check_frames(&plan);
         Report {
             keys: 1,
             events: farm.events(),
             incidents: farm.coordinator.witness.incidents,
             restarts: farm.coordinator.restarts(),
             adopted: farm.coordinator.witness.adopted,
+            convicted: farm.coordinator.witness.convicted,
         }
     };
     catch_unwind(AssertUnwindSafe(run)).map_err(|panic| {
@@ -102,5 +106,6 @@ impl Report {
         self.incidents += other.incidents;
         self.restarts += other.restarts;
         self.adopted += other.adopted;
+        self.convicted += other.convicted;
     }
 }

@@ -194,7 +194,7 @@ impl Sched {
         if self.is_check(number) {
             self.checked(number, arrival.block, made, out);
         } else if self.differs(number, made) {
-            self.incident(number, arrival.block, out);
+            self.differed(number, arrival.block, made, out);
         }
     }
 
@@ -220,28 +220,6 @@ impl Sched {
         false
     }
 
-    /// Two renderings of a block differ. Nobody knows which is right: the one that
-    /// came later ends, its worker gets no more of the job for a while, and somebody is told.
-    fn incident(&mut self, number: u64, block: BlockRef, out: &mut Vec<Effect>) {
-        let attempt = &self.attempts[number];
-        let (place, tile) = (attempt.worker, attempt.tile);
-        let worker = self.workers[place].id;
-        let mut other = None;
-        if let Some((job, image)) = self.job_and_place(block.image) {
-            job.tally.incidents += 1;
-            let tile = job.work.get(&image).and_then(|work| work.tiles.get(tile));
-            other = tile.and_then(|tile| tile.attempts().find(|&live| live != number));
-        }
-        let other = other.map(|other| self.workers[self.attempts[other].worker].id);
-        out.push(Effect::Incident {
-            block,
-            worker,
-            other,
-        });
-        self.revoke(number, RevokeReason::Differs, out);
-        self.is_at_fault(place, block.image.job, out);
-    }
-
     /// Ends the attempts at a tile of which every pixel is durable. One that has
     /// delivered all it was leased for knows; the others are told.
     fn tile_done(&mut self, image: ImageRef, tile: u32, by: WorkerId, out: &mut Vec<Effect>) {
@@ -259,7 +237,9 @@ impl Sched {
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
         let is_whole = done.seen.len() == done.rect.blocks().count();
-        if able > 1 && is_whole && is_drawn(verify, image, done.region) {
+        let is_drawn = is_whole && is_drawn(verify, image, done.region);
+        let is_doubted = verify > 0 && !done.dissent.is_empty();
+        if able > 1 && (is_drawn || is_doubted) {
             done.verified = Verified::Due;
         }
         let live: [Option<u64>; 2] = {

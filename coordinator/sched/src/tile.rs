@@ -21,6 +21,8 @@ pub(crate) struct Tile {
     live: [Option<u64>; LIVE_MAX],
     /// Blocks that arrived and may be compared with another rendering of them.
     pub(crate) seen: Vec<Made>,
+    /// Those of them that a second attempt made otherwise.
+    pub(crate) dissent: Vec<Made>,
     /// What becomes of it when it is done.
     pub(crate) verified: Verified,
     /// Where it is rendered once more: what it is held against.
@@ -65,6 +67,7 @@ impl Tile {
             trouble,
             live: [None; LIVE_MAX],
             seen: Vec::new(),
+            dissent: Vec::new(),
             verified: Verified::No,
             check: None,
         }

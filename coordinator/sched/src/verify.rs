@@ -32,16 +32,13 @@ pub(crate) struct Check {
 }
 
 impl Check {
-    /// Of blocks that are durable.
-    pub(crate) fn of(first: Vec<Made>) -> Self {
-        let mut by: Vec<WorkerId> = first.iter().map(|made| made.by).collect();
+    /// Of blocks that are durable, and what others made of them.
+    pub(crate) fn of(first: Vec<Made>, dissent: Vec<Made>) -> Self {
+        let makers = first.iter().chain(&dissent).map(|made| made.by);
+        let mut by: Vec<WorkerId> = makers.collect();
         by.sort_unstable();
         by.dedup();
-        Self {
-            first,
-            dissent: Vec::new(),
-            by,
-        }
+        Self { first, dissent, by }
     }
 
     /// Whether a worker rendered some of it before.
@@ -168,7 +165,7 @@ impl Sched {
         self.end_attempt(number);
     }
 
-    fn is_incident(
+    pub(crate) fn is_incident(
         &mut self,
         block: BlockRef,
         worker: WorkerId,
@@ -184,6 +181,31 @@ impl Sched {
             worker,
             other,
         });
+    }
+
+    /// Two attempts at a tile made different pixels of a block: the later one ends, and a third decides where there is one.
+    pub(crate) fn differed(
+        &mut self,
+        number: u64,
+        block: BlockRef,
+        made: Made,
+        out: &mut Vec<Effect>,
+    ) {
+        let (place, job) = (self.attempts[number].worker, block.image.job);
+        let tile = self.checked_tile(number);
+        let seen = tile.as_ref().map(|tile| tile.seen.iter());
+        let first = seen.and_then(|mut seen| seen.find(|seen| seen.rect == made.rect));
+        let first = first.map_or(made.by, |first| first.by);
+        if let Some(tile) = tile {
+            tile.dissent.push(made);
+        }
+        self.is_incident(block, made.by, first, out);
+        self.revoke(number, RevokeReason::Differs, out);
+        self.is_at_fault(place, job, out);
+        if self.config.verify > 0 && self.has_another(job, &[made.by, first]) {
+            self.doubt(first, job, out);
+            self.doubt(made.by, job, out);
+        }
     }
 
     /// Whether somebody else could render what these did.

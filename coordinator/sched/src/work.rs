@@ -390,7 +390,8 @@ impl Work {
         } else if let Some(check) = tile.check {
             self.checks.push_back((region, check));
         } else if tile.verified == Verified::Due {
-            self.checks.push_back((region, Check::of(tile.seen)));
+            self.checks
+                .push_back((region, Check::of(tile.seen, tile.dissent)));
         }
     }
 

@@ -44,7 +44,8 @@ fn leased(farm: &mut Farm) -> Vec<(u64, u64, u32)> {
 }
 
 fn state(farm: &Farm, image: u32) -> ImageState {
-    farm.sched.image(image_ref(image)).unwrap().state
+    let view = farm.sched.image(image_ref(image));
+    view.expect("it is there").state
 }
 
 #[test]

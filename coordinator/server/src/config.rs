@@ -20,6 +20,8 @@ pub struct Config {
     pub heartbeat_interval: Span,
     /// A worker of which nothing is heard for so long is lost.
     pub liveness_limit: Span,
+    /// Of a million tiles, so many are rendered once more by another worker and compared to the bit.
+    pub verify: u32,
     /// A program that is run whenever a job is over; `None`: none.
     pub on_job_end: Option<PathBuf>,
     /// Limits on what others may make it hold.
@@ -55,6 +57,7 @@ impl Config {
             build: build.into(),
             heartbeat_interval: Span::from_secs(1),
             liveness_limit: Span::from_secs(4),
+            verify: 5_000,
             on_job_end: None,
             limits: Limits::default(),
         }
@@ -69,6 +72,7 @@ pub(crate) fn scheduling(config: &Config, epoch: Epoch) -> sched::Config {
     sched::Config {
         revision: Some(config.revision),
         liveness_limit: config.liveness_limit,
+        verify: config.verify,
         limits: sched::Limits {
             workers_max: WORKERS_MAX,
             ..sched::Limits::default()

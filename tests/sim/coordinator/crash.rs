@@ -30,14 +30,14 @@ impl Coordinator {
         self.committed.clear();
         self.wishes.clear();
         self.witness.crash();
-        self.sched = Sched::new(config(self.epoch));
+        self.sched = Sched::new(config(self.epoch, &self.plan));
     }
 
     /// A coordinator starts over what is there.
     pub(crate) fn restart(&mut self, now: Timestamp) {
         self.epoch += 1;
         self.is_up = true;
-        self.sched = Sched::new(config(self.epoch));
+        self.sched = Sched::new(config(self.epoch, &self.plan));
         let recalled = self.store.recall().expect("it is in memory");
         let mut effects = Vec::new();
         for (_, event) in recalled.events() {

@@ -1,7 +1,7 @@
 //! What the scheduler wants: done in order, after what it waits for is committed.
 
 use model::{Epoch, ImageRef, Span, Timestamp};
-use sched::{Effect, Event, ImageState, JobOutcome, JobState};
+use sched::{Command, Effect, Event, ImageState, JobOutcome, JobState};
 use session::{BlockVerdict, Retry, Welcome};
 
 use super::writer::Order;
@@ -94,6 +94,16 @@ impl Coordinator {
             Effect::Forget { worker } => return self.wishes.push(Wish::Close(worker)),
             Effect::GiveUp { image, reason } => {
                 return self.tell(now, Event::ImageFailed { image, reason });
+            }
+            Effect::RenderAgain { image, .. } => {
+                self.witness.convicted += 1;
+                return self.tell(
+                    now,
+                    Event::Command {
+                        job: image.job,
+                        command: Command::Again(image.image),
+                    },
+                );
             }
             Effect::DropScratch { image } => return self.order(Order::Remove(image)),
             Effect::Submitted { submission, job } => {

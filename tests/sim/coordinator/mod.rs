@@ -13,10 +13,10 @@ mod writer;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 use model::{Epoch, ImageRef, JobId, Revision, Span, Timestamp, WorkerId};
-use sched::{Config, Sched};
+use sched::{Config, ImageState, Sched};
 use store::Memory;
 
-use crate::disk::Disk;
+use crate::disk::{Disk, flaws};
 use crate::message::Down;
 use crate::plan::{Bug, Plan};
 use crate::witness::Witness;
@@ -72,7 +72,7 @@ pub(crate) struct Coordinator {
 impl Coordinator {
     pub(crate) fn new(plan: Plan) -> Self {
         Self {
-            sched: Sched::new(config(1)),
+            sched: Sched::new(config(1, &plan)),
             disk: Disk::default(),
             store: Memory::new(),
             witness: Witness::default(),
@@ -125,6 +125,15 @@ impl Coordinator {
         }
     }
 
+    /// Frames in their place that have a wrong pixel.
+    pub(crate) fn wrong_frames(&self) -> usize {
+        let is_wrong = |(image, frame): &(&ImageRef, &Vec<u8>)| {
+            let state = self.sched.image(**image).map(|view| view.state);
+            matches!(state, Some(ImageState::Encoded { .. })) && flaws(**image, frame).1 > 0
+        };
+        self.disk.frames.iter().filter(is_wrong).count()
+    }
+
     fn era(&self, image: ImageRef) -> u32 {
         self.eras.get(&image).copied().unwrap_or(0)
     }
@@ -136,10 +145,11 @@ impl Coordinator {
     }
 }
 
-fn config(epoch: u64) -> Config {
+fn config(epoch: u64, plan: &Plan) -> Config {
     Config {
         images_in_flight_max: 3,
         tile_failures_max: 2,
+        verify: plan.verify,
         ..Config::new(Epoch(epoch))
     }
 }

@@ -8,6 +8,7 @@ use sched::{
     BlockRef, BlockRefusal, Command, Effect, Event, JobOutcome, RevokeReason, WorkerRefusal,
 };
 use store::Entry;
+use tokio::sync::oneshot;
 use tonic::Status;
 use wire::Failure;
 use wire::proto::{self, ErrorKind, control_down, deliver_down};
@@ -15,7 +16,7 @@ use wire::proto::{self, ErrorKind, control_down, deliver_down};
 use super::{Shell, Submitting};
 use crate::about::JobAbout;
 use crate::inbox::NewJob;
-use crate::input::Frames;
+use crate::input::{Frames, Wish};
 use crate::job::{Foretold, Job};
 use crate::storage::{Era, Plan};
 use crate::worker::{Draining, Told, Worker};
@@ -108,6 +109,21 @@ impl Shell {
             } => self.incident(block, worker, other),
             Effect::Commanded { job } => self.commanded(job, None),
             Effect::CommandRefused { job, refusal } => self.commanded(job, Some(refusal)),
+            Effect::RenderAgain { image, worker } => {
+                let name = self.worker_name(worker);
+                tracing::error!(%worker, name, job = %image.job, image = %image.image, "a worker's pixels were wrong: an image that it had a part in is rendered again");
+                self.say(
+                    image.job,
+                    format!("frame {}: worker {name} had a part in it, whose pixels were wrong elsewhere", image.image),
+                );
+                // Nobody waits for the answer.
+                let (reply, _) = oneshot::channel();
+                let wish = Wish {
+                    command: Command::Again(image.image),
+                    frames: Frames::Stay,
+                };
+                self.command(image.job, wish, reply);
+            }
             Effect::DropScratch { image } => {
                 if let Some(job) = self.jobs.get_mut(image.job) {
                     job.take_work(image.image);
@@ -381,7 +397,7 @@ impl Shell {
         self.say(
             image.job,
             format!(
-                "frame {}: workers {name} and {other} made different pixels at {},{}; the first to arrive are kept",
+                "frame {}: workers {name} and {other} made different pixels at {},{}; a third worker decides where there is one, else the first to arrive are kept",
                 image.image, rect.x0, rect.y0
             ),
         );
@@ -578,6 +594,7 @@ fn revoke_words(reason: RevokeReason) -> &'static str {
         RevokeReason::Paused => "the job pauses",
         RevokeReason::CalledBack => "another worker has nothing to do",
         RevokeReason::Differs => "its pixels differ from another worker's",
+        RevokeReason::RenderedAgain => "the frame is rendered again from its first pixel",
         RevokeReason::ImageFailed => "the image failed",
         RevokeReason::NoProgress => "no block came for too long",
         RevokeReason::NotLive => "the attempt had ended before",

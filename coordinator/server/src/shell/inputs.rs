@@ -160,7 +160,7 @@ impl Shell {
     }
 
     /// Does what a user wants of a job; answers with the job as it is then, or was where it is forgotten.
-    fn command(&mut self, job: JobId, wish: Wish, reply: Reply<proto::JobSummary>) {
+    pub(super) fn command(&mut self, job: JobId, wish: Wish, reply: Reply<proto::JobSummary>) {
         let Some(before) = self.summary(job) else {
             let _ = reply.send(Err(super::views::no_job(job)));
             return;
