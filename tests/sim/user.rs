@@ -128,7 +128,6 @@ impl User {
 
     fn wish(&mut self, sched: &Sched, random: &mut Random) -> Option<Event> {
         let index = usize::try_from(random.below(self.jobs.len() as u64)).expect("it is small");
-        let is_waited_for = self.jobs.iter().any(|job| job.after.contains(&index));
         let wanted = &mut self.jobs[index];
         let job = wanted.job?;
         let frames = wanted.submission.frames;
@@ -146,12 +145,6 @@ impl User {
             12 => Command::Focus(None),
             13..15 => Command::Retry,
             15..18 => {
-                // Not where another one has waited for it: the store keeps what that was submitted to wait for, and
-                // after a restart it would wait again, though it may have begun.
-                let finished = JobState::Over(JobOutcome::Finished);
-                if is_waited_for && sched.job(job)?.state == finished {
-                    return None;
-                }
                 let place =
                     u32::try_from(random.below(frames.count().into())).expect("it is small");
                 Command::Again(frames.nth(place)?)

@@ -9,7 +9,7 @@ use sched::{Command, Submission};
 /// block and a command for a job that was cancelled, but for its removal, and a block of an image that is over.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Entry {
-    /// A job was taken.
+    /// A job was taken. Of those that it waits for, the ones that are finished by now need not be kept.
     Submitted {
         /// Its number. One that is known already stays what it is.
         job: JobId,
@@ -40,7 +40,8 @@ pub enum Entry {
         /// Which.
         rects: Vec<Rect>,
     },
-    /// An image is synced and in its place. Its blocks are no longer needed.
+    /// An image is synced and in its place. Its blocks are no longer needed. Where it was the last of its job, nobody waits
+    /// for that any more, whatever is rendered again of it later.
     ///
     /// Whether an image is encoded or failed is said by whatever was told first, until a
     /// [`Command::Retry`] or [`Command::Again`] makes it nothing again.

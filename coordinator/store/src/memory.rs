@@ -74,9 +74,13 @@ impl Memory {
                 about,
             } => {
                 self.last_job = self.last_job.max(job.0);
+                let mut submission = submission.clone();
+                let is_finished =
+                    |before: &JobId| self.jobs.get(before).is_some_and(Job::is_finished);
+                submission.after.retain(|before| !is_finished(before));
                 self.jobs
                     .entry(*job)
-                    .or_insert_with(|| Job::new(*unix_ms, submission.clone(), about.clone()));
+                    .or_insert_with(|| Job::new(*unix_ms, submission, about.clone()));
             }
             Entry::Block {
                 image,
@@ -168,6 +172,14 @@ impl Memory {
         if let Some(job) = self.jobs.get_mut(&image.job) {
             job.images.entry(image.image).or_insert(over);
             job.blocks.remove(&image.image);
+            if job.is_finished() {
+                for waiting in self.jobs.values_mut() {
+                    waiting
+                        .submission
+                        .after
+                        .retain(|&before| before != image.job);
+                }
+            }
         }
     }
 }
@@ -240,6 +252,11 @@ impl Job {
             // The whole job is gone already.
             Command::Remove => {}
         }
+    }
+
+    fn is_finished(&self) -> bool {
+        let is_encoded = |image: &RecalledImage| matches!(image, RecalledImage::Encoded { .. });
+        self.is_over() && self.images.values().all(is_encoded)
     }
 
     fn is_over(&self) -> bool {

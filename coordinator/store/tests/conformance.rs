@@ -265,6 +265,42 @@ fn retry_and_again_make_images_nothing(store: impl Crash) {
     assert_eq!(begun, [3, 5]);
 }
 
+fn a_job_that_was_finished_is_waited_for_no_more(mut store: impl Crash) {
+    let waiting = |job: u64, after: &[u64]| {
+        let mut submission = submission(job);
+        submission.frames = "3..5".parse().unwrap();
+        submission.after = after.iter().copied().map(JobId).collect();
+        Entry::Submitted {
+            job: JobId(job),
+            unix_ms: 1_000,
+            submission,
+            about: String::new(),
+        }
+    };
+    let entries = [
+        waiting(1, &[]),
+        waiting(2, &[]),
+        waiting(3, &[2, 1]),
+        encoded(1, 3),
+        failed(2, 3),
+        encoded(2, 4),
+        encoded(1, 4),
+        // Begun anew, which changes nothing for who waited.
+        wants(1, Command::Again(ImageNumber(3))),
+        waiting(4, &[1, 2]),
+        encoded(1, 3),
+        waiting(5, &[1, 2]),
+        wants(1, Command::Again(ImageNumber(3))),
+    ];
+    store.commit(&entries).unwrap();
+    let recalled = store.crash().recall().unwrap();
+    let after = |job: usize| {
+        let after = recalled.jobs[job - 1].submission.after.iter();
+        after.map(|job| job.0).collect::<Vec<_>>()
+    };
+    assert_eq!((after(3), after(4), after(5)), (vec![2], vec![2], vec![2]));
+}
+
 fn commands_change_the_job(mut store: impl Crash) {
     store
         .commit(&[
@@ -391,6 +427,7 @@ for_every_store! {
     lost_blocks_can_come_again
     an_image_that_is_over_has_no_blocks
     retry_and_again_make_images_nothing
+    a_job_that_was_finished_is_waited_for_no_more
     commands_change_the_job
     a_cancelled_job_keeps_its_frames_alone
     cancelling_a_job_that_is_over_changes_nothing

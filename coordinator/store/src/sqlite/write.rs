@@ -86,7 +86,8 @@ impl Writer<'_> {
                         about,
                     ],
                 )?;
-                self.drop_blocks(*image)
+                self.drop_blocks(*image)?;
+                self.wait_no_more(image.job)
             }
             Entry::ImageFailed {
                 image,
@@ -158,6 +159,9 @@ impl Writer<'_> {
             self.run("INSERT INTO labels VALUES (?1, ?2)", params![job, label])?;
         }
         for (place, after) in submission.after.iter().enumerate() {
+            if self.is_finished(*after)? {
+                continue;
+            }
             self.run(
                 "INSERT INTO waits VALUES (?1, ?2, ?3)",
                 params![job, int(place as u64), int(after.0)],
@@ -190,6 +194,25 @@ impl Writer<'_> {
                 rect.x1,
             ],
         )
+    }
+
+    /// Nobody waits any more for a job that is finished.
+    fn wait_no_more(&self, job: JobId) -> rusqlite::Result<()> {
+        let id = int(job.0);
+        // Asked first, since few jobs are waited for, and a job may have very many images.
+        let is_waited_for = self.exists("SELECT 1 FROM waits WHERE waits_for = ?1", [id])?;
+        if is_waited_for && self.is_finished(job)? {
+            self.run("DELETE FROM waits WHERE waits_for = ?1", [id])?;
+        }
+        Ok(())
+    }
+
+    /// Whether every image of a job is in its place.
+    fn is_finished(&self, job: JobId) -> rusqlite::Result<bool> {
+        let sql = "SELECT 1 FROM jobs WHERE job = ?1
+                 AND (SELECT count(*) FROM images WHERE job = ?1 AND state = 'encoded')
+                     >= (frames_end - frames_start + frames_step - 1) / frames_step";
+        self.exists(sql, [int(job.0)])
     }
 
     fn drop_blocks(&self, image: ImageRef) -> rusqlite::Result<()> {
