@@ -113,7 +113,7 @@ impl User {
         }
         if wishes && self.wishes < WISHES_MAX {
             self.wishes += 1;
-            events.extend(self.wish(sched, random));
+            events.extend(self.wish(random));
         }
         events
     }
@@ -126,7 +126,7 @@ impl User {
         Some(numbers)
     }
 
-    fn wish(&mut self, sched: &Sched, random: &mut Random) -> Option<Event> {
+    fn wish(&mut self, random: &mut Random) -> Option<Event> {
         let index = usize::try_from(random.below(self.jobs.len() as u64)).expect("it is small");
         let wanted = &mut self.jobs[index];
         let job = wanted.job?;
