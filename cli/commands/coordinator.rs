@@ -6,6 +6,7 @@ use clap::Args;
 use model::Span;
 use server::StartError;
 
+use crate::bench::farm::null;
 use crate::daemon::{self, DaemonOptions, Started};
 use crate::error::Error;
 use crate::options::Context;
@@ -22,13 +23,22 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "TIME", default_value = "4 s", value_parser = values::span)]
     liveness: Span,
 
+    /// Takes the pixels of `bench farm` and no others; refused over any other state folder than its own.
+    #[arg(long, hide = true)]
+    null_renderer: bool,
+
     #[command(flatten)]
     daemon: DaemonOptions,
 }
 
 /// Runs the command.
 pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Error> {
-    let usual = server::Config::new(context.state()?, revision(), daemon::software());
+    let state = context.state()?;
+    let revision = match options.null_renderer {
+        true => null::revision_over(&state)?,
+        false => model::Revision(render::REVISION),
+    };
+    let usual = server::Config::new(state, revision, daemon::software());
     let config = server::Config {
         listen: options.listen,
         liveness_limit: options.liveness,
@@ -48,10 +58,6 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         ended.map_err(|broken| Error::failed("the coordinator had to stop").because(broken))?;
         Ok(Ending::Done)
     })
-}
-
-fn revision() -> model::Revision {
-    model::Revision(render::REVISION)
 }
 
 fn not_started(error: StartError) -> Error {

@@ -32,6 +32,7 @@ mod jobs;
 mod leasing;
 mod links;
 mod live;
+pub mod load;
 mod market;
 mod needs;
 mod pace;
