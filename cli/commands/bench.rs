@@ -1,5 +1,6 @@
 //! `flyby bench`: measurements beside those of the reference documents.
 
+mod farm;
 mod peers;
 mod techniques;
 mod threads;
@@ -19,6 +20,8 @@ use crate::output;
 pub(crate) enum BenchCommand {
     /// Evaluations per ray of the methods of thesis chapter 5, beside its tables 5.1 to 5.5.
     Thesis(Options),
+    /// What the farm itself costs: scheduler, coordinator, store and links, with a renderer that renders nothing.
+    Farm(farm::Options),
     /// Times of one thread beside other programs' on the same surfaces, in turns.
     Peers(peers::Options),
     /// The tracer without each of its techniques in turn: equal pixels by more work.
@@ -59,6 +62,7 @@ pub(crate) fn run(context: &Context, command: BenchCommand) -> Result<Ending, Er
             output::print(context.output, &tables(&options)?)?;
             Ok(Ending::Done)
         }
+        BenchCommand::Farm(options) => farm::run(context, &options),
         BenchCommand::Peers(options) => peers::run(context, &options),
         BenchCommand::Techniques(options) => techniques::run(context, &options),
         BenchCommand::Threads(options) => threads::run(context, &options),

@@ -8,6 +8,7 @@ use clap::Args;
 use model::Span;
 use server::StartError;
 
+use crate::bench::farm::null;
 use crate::daemon::{self, DaemonOptions, Started};
 use crate::error::Error;
 use crate::options::Context;
@@ -35,13 +36,22 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "PROGRAM")]
     on_job_end: Option<PathBuf>,
 
+    /// Takes the pixels of `bench farm` and no others; refused over any other state folder than its own.
+    #[arg(long, hide = true)]
+    null_renderer: bool,
+
     #[command(flatten)]
     daemon: DaemonOptions,
 }
 
 /// Runs the command.
 pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Error> {
-    let usual = server::Config::new(context.state()?, revision(), daemon::software());
+    let state = context.state()?;
+    let revision = match options.null_renderer {
+        true => null::revision_over(&state)?,
+        false => model::Revision(render::REVISION),
+    };
+    let usual = server::Config::new(state, revision, daemon::software());
     let config = server::Config {
         listen: options.listen,
         liveness_limit: options.liveness,
@@ -78,10 +88,6 @@ fn program(path: &Path) -> Result<PathBuf, Error> {
             .next("`chmod +x` it, if it is a script"));
     }
     Ok(found)
-}
-
-fn revision() -> model::Revision {
-    model::Revision(render::REVISION)
 }
 
 fn not_started(error: StartError) -> Error {

@@ -5,7 +5,7 @@
 
 use std::fs::{self, File};
 use std::io::{self, BufRead as _, BufReader};
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr, SocketAddrV4};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -28,6 +28,9 @@ const END_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// How often children are looked at.
 const LOOK_INTERVAL: Duration = Duration::from_millis(100);
+
+/// Where a coordinator listens on this machine, on any free port.
+pub(crate) const ANY_PORT: SocketAddr = SocketAddr::V4(SocketAddrV4::new(Ipv4Addr::LOCALHOST, 0));
 
 /// Bytes of a child's log that are part of a message.
 const LOG_TAIL_BYTES: usize = 2_000;
@@ -53,8 +56,8 @@ pub(crate) struct LocalFarm {
     state: TempDir,
 }
 
-/// A child.
-struct Process {
+/// A child; dropping it kills it.
+pub(crate) struct Process {
     name: String,
     child: Child,
     log: PathBuf,
@@ -75,7 +78,7 @@ impl LocalFarm {
             .map_err(|error| {
                 Error::failed("cannot make a temporary folder for the farm").because(error)
             })?;
-        let (coordinator, address) = coordinator(state.path(), stop)?;
+        let (coordinator, address) = coordinator(state.path(), ANY_PORT, &[], stop)?;
         let mut farm = Self {
             address,
             children: Arc::new(Mutex::new(vec![coordinator])),
@@ -160,8 +163,13 @@ impl Process {
         Ok(Self { name, child, log })
     }
 
+    /// Its number.
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Why it has ended, if it has.
-    fn ended(&mut self) -> Option<String> {
+    pub(crate) fn ended(&mut self) -> Option<String> {
         let status = self.child.try_wait().ok()??;
         Some(format!(
             "the {} ended with {status}; it said:\n{}",
@@ -193,14 +201,16 @@ impl Drop for Process {
     }
 }
 
-fn coordinator(state: &Path, stop: &Stop) -> Result<(Process, SocketAddr), Error> {
-    let arguments = [
-        "coordinator",
-        "--listen",
-        "127.0.0.1:0",
-        "--liveness",
-        "4 s",
-    ];
+/// Starts a coordinator over a state folder, with these options beside the usual ones; answers once it listens, and where.
+pub(crate) fn coordinator(
+    state: &Path,
+    listen: SocketAddr,
+    options: &[&str],
+    stop: &Stop,
+) -> Result<(Process, SocketAddr), Error> {
+    let listen = listen.to_string();
+    let mut arguments = vec!["coordinator", "--listen", &listen, "--liveness", "4 s"];
+    arguments.extend(options);
     let mut process = Process::start("coordinator".to_owned(), state, &arguments)?;
     let stdout = process.child.stdout.take().expect("it is piped");
     let (tell, heard) = mpsc::channel();

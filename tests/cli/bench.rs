@@ -129,3 +129,60 @@ fn techniques_of_the_tracer_gain_work_and_change_no_pixel() {
         assert!(by.len() == 6 && by.iter().all(|one| one["is_equal"] == true));
     }
 }
+
+#[test]
+fn the_farm_s_own_costs_have_a_row_each() {
+    let place = Place::new();
+    let folder = place.path("measured");
+    std::fs::create_dir(&folder).unwrap();
+    let args = [
+        "bench", "farm", "--tiles", "1000", "--folder", "measured", "--output", "json",
+    ];
+    let (out, _) = place.ends(0, &args);
+    let report: Value = serde_json::from_str(&out).unwrap();
+    let rows = report["rows"].as_array().unwrap();
+    let names: Vec<&str> = rows
+        .iter()
+        .map(|row| row["row"].as_str().unwrap())
+        .collect();
+    let expected = [
+        "scheduler",
+        "disk-syncs",
+        "submit",
+        "one-worker",
+        "one-worker-cpu",
+        "sixteen-workers",
+        "sixteen-workers-cpu",
+        "killed",
+        "restart",
+        "memory",
+        "disk-write",
+        "blocks",
+        "blocks-share",
+    ];
+    assert_eq!(names, expected);
+    for row in rows {
+        assert!(row["value"].as_f64().unwrap() >= 0.0, "{row}");
+    }
+    let killed = rows.iter().find(|row| row["row"] == "killed").unwrap();
+    assert_eq!(
+        (&killed["value"], &killed["reached"]),
+        (&0.0.into(), &true.into())
+    );
+    // Budgets of a million tiles are not judged by a thousand.
+    let memory = rows.iter().find(|row| row["row"] == "memory").unwrap();
+    assert!(memory["reached"].is_null(), "{memory}");
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+    let (_, said) = place.ends(2, &["bench", "farm", "nothing"]);
+    assert!(said.contains("sixteen-workers-cpu"), "{said}");
+}
+
+#[test]
+fn no_other_coordinator_takes_the_pixels_of_a_measurement() {
+    let place = Place::new();
+    let (_, said) = place.ends(2, &["coordinator", "--null-renderer", "--state", "."]);
+    assert!(
+        said.contains("no state folder of `flyby bench farm`"),
+        "{said}"
+    );
+}

@@ -34,6 +34,7 @@ mod jobs;
 mod leasing;
 mod links;
 mod live;
+pub mod load;
 mod market;
 mod needs;
 mod pace;

@@ -1,0 +1,87 @@
+//! Workers of the null renderer, in this process.
+
+use std::net::SocketAddr;
+use std::num::NonZeroU32;
+use std::sync::Arc;
+use std::time::Instant;
+
+use agent::{Ask, ExitReason, RunError};
+use tokio::runtime::Runtime;
+use tokio::sync::mpsc;
+use tokio::task::JoinHandle;
+use wire::auth::Token;
+
+use super::null::Null;
+use crate::error::Error;
+
+/// Threads of each worker.
+pub(crate) const THREADS: NonZeroU32 = NonZeroU32::new(2).expect("it is not 0");
+
+/// A worker's task.
+type Worker = JoinHandle<Result<ExitReason, RunError>>;
+
+/// Workers that run until they are told to leave.
+pub(crate) struct Crew<'a> {
+    runtime: &'a Runtime,
+    workers: Vec<(mpsc::Sender<Ask>, Worker)>,
+    null: Null,
+}
+
+impl<'a> Crew<'a> {
+    /// Starts so many workers; each comes back by itself where the coordinator is gone for a while.
+    pub(crate) fn start(
+        runtime: &'a Runtime,
+        count: usize,
+        coordinator: SocketAddr,
+        token: &Token,
+    ) -> Self {
+        let null = Null::default();
+        let workers = (1..=count).map(|number| {
+            let config = agent::Config::new(
+                coordinator,
+                token.clone(),
+                format!("null-{number}"),
+                THREADS,
+            );
+            let (asks, heard) = mpsc::channel(1);
+            let painter = Arc::new(null.clone());
+            (asks, runtime.spawn(agent::run(config, painter, heard)))
+        });
+        Self {
+            runtime,
+            workers: workers.collect(),
+            null,
+        }
+    }
+
+    /// When the first of them was given its first tile.
+    pub(crate) fn first(&self) -> Option<Instant> {
+        self.null.first()
+    }
+
+    /// Why one of them has ended by itself, if one has.
+    pub(crate) fn ended(&mut self) -> Option<Error> {
+        let place = self
+            .workers
+            .iter()
+            .position(|(_, task)| task.is_finished())?;
+        let (_, task) = self.workers.swap_remove(place);
+        let failed = Error::failed("a worker of the measurement ended by itself");
+        Some(match self.runtime.block_on(task) {
+            Ok(Ok(reason)) => failed.because(format!("{reason:?}")),
+            Ok(Err(error)) => failed.because(error),
+            Err(error) => failed.because(error),
+        })
+    }
+
+    /// Has all of them give back what they hold, and leave.
+    pub(crate) fn leave(self) {
+        for (asks, _) in &self.workers {
+            // One that has ended by itself needs no telling.
+            let _ = asks.try_send(Ask::Stop);
+        }
+        for (_, task) in self.workers {
+            let _ = self.runtime.block_on(task);
+        }
+    }
+}

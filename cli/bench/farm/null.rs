@@ -1,0 +1,111 @@
+//! A renderer that renders nothing: blocks at once, every pixel the same.
+//!
+//! Its pixels have a revision of their own, so that no coordinator but one that was started for it takes them, that one
+//! takes no others, and no frame of it passes for a real one. Such a coordinator runs only over a state folder that
+//! [`mark`] made.
+
+use std::fs;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
+use std::time::Instant;
+
+use agent::{Assets, Cancelled, Counters, OpenImage, Painter};
+use model::film::CHANNEL_COUNT;
+use model::{ImageNumber, Rect, Revision};
+use scene::Description;
+
+use crate::error::Error;
+
+/// The revision of its pixels; the renderer's own count from 1.
+pub(crate) const REVISION: Revision = Revision(u32::MAX);
+
+/// The file that says that a state folder is a measurement's.
+const MARK: &str = "only-for-measuring";
+
+/// Every value of every pixel.
+const VALUE: f32 = 0.5;
+
+/// Makes a state folder a measurement's.
+pub(crate) fn mark(state: &Path) -> Result<(), Error> {
+    fs::write(state.join(MARK), "flyby bench farm\n")
+        .map_err(|error| Error::failed("cannot write into the temporary folder").because(error))
+}
+
+/// The revision that a coordinator over a measurement's state folder takes; any other folder is refused.
+pub(crate) fn revision_over(state: &Path) -> Result<Revision, Error> {
+    match state.join(MARK).is_file() {
+        true => Ok(REVISION),
+        false => Err(Error::usage(format!(
+            "`{}` is no state folder of `flyby bench farm`, so that no coordinator may take its pixels there",
+            state.display()
+        ))),
+    }
+}
+
+/// The renderer; clones share what it counts.
+#[derive(Clone, Default)]
+pub(crate) struct Null {
+    told: Arc<Told>,
+}
+
+#[derive(Default)]
+struct Told {
+    first: OnceLock<Instant>,
+}
+
+impl Null {
+    /// When it was asked for its first block.
+    pub(crate) fn first(&self) -> Option<Instant> {
+        self.told.first.get().copied()
+    }
+}
+
+impl Painter for Null {
+    fn revision(&self) -> Revision {
+        REVISION
+    }
+
+    fn simd_level(&self) -> String {
+        "none".to_owned()
+    }
+
+    fn open(
+        &self,
+        _: &Description,
+        _: &Assets,
+        _: ImageNumber,
+    ) -> Result<Arc<dyn OpenImage>, String> {
+        Ok(Arc::new(self.clone()))
+    }
+}
+
+impl OpenImage for Null {
+    fn render_block(
+        &self,
+        rect: Rect,
+        _: &AtomicBool,
+        pixels: &mut Vec<f32>,
+    ) -> Result<Counters, Cancelled> {
+        self.told.first.get_or_init(Instant::now);
+        pixels.clear();
+        let (width, height) = (rect.width() as usize, rect.height() as usize);
+        pixels.resize(CHANNEL_COUNT * width * height, VALUE);
+        Ok(Counters::new())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_a_measurement_s_folder_is_taken() {
+        let state = tempfile::tempdir().unwrap();
+        let refused = revision_over(state.path()).unwrap_err();
+        assert!(refused.to_string().contains("bench farm"), "{refused}");
+        mark(state.path()).unwrap();
+        assert_eq!(revision_over(state.path()).unwrap(), REVISION);
+        assert_ne!(REVISION, Revision(render::REVISION));
+    }
+}
