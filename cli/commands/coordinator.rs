@@ -25,14 +25,15 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "TIME", default_value = "4 s", value_parser = values::span)]
     liveness: Span,
 
-    /// How many tiles of a hundred are rendered once more by another worker and compared to the bit; a worker whose pixels are
-    /// wrong is found, and what it made is rendered again. 0 is none.
-    #[arg(long, value_name = "PERCENT", default_value = "0.5", value_parser = values::percent)]
+    /// How many tiles of a hundred are rendered once more by another worker and compared to the bit; where two differ a third
+    /// decides, and what the wrong one made is rendered again. Frames wait for it, so there should be three workers or more without
+    /// time limits. 0 is none.
+    #[arg(long, value_name = "PERCENT", default_value = "0", value_parser = values::percent)]
     verify: u32,
 
     /// A program to run whenever a job is over; its environment names the job: FLYBY_JOB, FLYBY_JOB_NAME,
     /// FLYBY_JOB_STATE (done, failed or cancelled), FLYBY_JOB_FRAMES, FLYBY_JOB_FRAMES_DONE, FLYBY_JOB_FRAMES_FAILED and
-    /// FLYBY_JOB_FOLDER, where its frames are.
+    /// FLYBY_JOB_FOLDER, where its frames are. One run at a time, of ten minutes at most; one that runs when the coordinator stops is killed.
     #[arg(long, value_name = "PROGRAM")]
     on_job_end: Option<PathBuf>,
 

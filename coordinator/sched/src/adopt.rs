@@ -34,16 +34,25 @@ impl Sched {
         if !is_old || !self.may_take_up(place, image) {
             return false;
         }
+        let Some((job, index)) = self.job_and_place(image) else {
+            return false;
+        };
+        if job.state(index) == ImageState::Waiting {
+            job.begin(index);
+        }
+        if !job
+            .work
+            .get(&index)
+            .is_some_and(|work| work.may_claim(tile))
+        {
+            return false;
+        }
         self.make_way(image, tile, out);
         let Some((job, index)) = self.job_and_place(image) else {
             return false;
         };
-        let work = match job.state(index) {
-            ImageState::Waiting => job.begin(index),
-            _ => match job.work.get_mut(&index) {
-                Some(work) => work,
-                None => return false,
-            },
+        let Some(work) = job.work.get_mut(&index) else {
+            return false;
         };
         let Some(number) = work.claim(tile) else {
             return false;

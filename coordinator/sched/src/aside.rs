@@ -77,7 +77,8 @@ impl Aside {
         let until = now + config.aside;
         self.jobs.push((job, until));
         if self.jobs.len() >= config.jobs_aside_max as usize {
-            self.farm = Some(until);
+            // One that is expelled stays so.
+            self.farm = self.farm.max(Some(until));
         }
         Verdict::AsideForJob
     }

@@ -135,6 +135,9 @@ impl Sched {
         };
         let (image, tile, rect) = (attempt.image, attempt.tile, attempt.rect);
         let worker = self.workers[attempt.worker].id;
+        if self.lets_check_be(number, out) {
+            return;
+        }
         let mut failures = 0;
         if let Some((job, place)) = self.job_and_place(image) {
             job.tally.attempts_failed += 1;
@@ -159,6 +162,9 @@ impl Sched {
             return;
         };
         let (image, tile, rect) = (attempt.image, attempt.tile, attempt.rect);
+        if self.lets_check_be(number, out) {
+            return;
+        }
         let mut losses = 0;
         if let Some((job, place)) = self.job_and_place(image) {
             job.tally.attempts_lost += 1;

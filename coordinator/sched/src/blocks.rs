@@ -67,6 +67,9 @@ impl Sched {
             return;
         };
         let new = work.pixels.add(rect);
+        if new > 0 {
+            work.made_by(worker);
+        }
         let tile = work.tile_of(rect);
         let mut tile_done = false;
         let mut purpose = Purpose::First;
@@ -171,7 +174,6 @@ impl Sched {
             && let Some(work) = job.work.get_mut(&index)
         {
             work.spent = work.spent.saturating_add(cost);
-            work.made_by(id);
         }
         let tally = &mut job.tally;
         tally.render_time = Span(tally.render_time.0.saturating_add(elapsed.0));

@@ -157,7 +157,18 @@ impl Sched {
         }
     }
 
-    /// All of it was as it is durable.
+    /// Ends an attempt that could not render something once more, if it is one: what is durable stays as it is.
+    pub(crate) fn lets_check_be(&mut self, number: u64, out: &mut Vec<Effect>) -> bool {
+        let is_check = self.is_check(number);
+        if is_check {
+            let image = self.attempts[number].image;
+            self.passes(number);
+            self.finish_image(image, out);
+        }
+        is_check
+    }
+
+    /// All of it was as it is durable, or nobody can say.
     fn passes(&mut self, number: u64) {
         if let Some(tile) = self.checked_tile(number) {
             tile.check = None;
@@ -224,6 +235,11 @@ impl Sched {
     /// A worker's pixels were wrong: nothing that it made is believed.
     fn convict(&mut self, worker: WorkerId, out: &mut Vec<Effect>) {
         self.expel(worker, out);
+        let place = self.workers.place(worker);
+        let live = place.map_or_else(Vec::new, |place| self.workers[place].live.clone());
+        for number in live {
+            self.revoke(number, RevokeReason::Differs, out);
+        }
         let jobs = self.jobs.values();
         let images = jobs.flat_map(|job| job.images_made_by(worker));
         out.extend(images.map(|image| Effect::RenderAgain { image, worker }));

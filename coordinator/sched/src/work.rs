@@ -188,6 +188,11 @@ impl Work {
         None
     }
 
+    /// Whether these pixels are a tile's that could have been cut, and not all durable.
+    pub(crate) fn may_claim(&self, rect: Rect) -> bool {
+        Region::at(rect, self.grid).is_some() && self.missing(rect) > 0
+    }
+
     /// Makes a tile of these pixels for an attempt that is there already; `None` where they are no tile's that could
     /// have been cut, are in another tile, or are all durable.
     pub(crate) fn claim(&mut self, rect: Rect) -> Option<u32> {

@@ -57,7 +57,7 @@ impl Config {
             build: build.into(),
             heartbeat_interval: Span::from_secs(1),
             liveness_limit: Span::from_secs(4),
-            verify: 5_000,
+            verify: 0,
             on_job_end: None,
             limits: Limits::default(),
         }

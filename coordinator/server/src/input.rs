@@ -113,6 +113,8 @@ pub(crate) struct Wish {
     pub(crate) command: Command,
     /// Whether a job that is forgotten leaves no frames.
     pub(crate) frames: Frames,
+    /// Only where the job was over at this time, in milliseconds since 1970, and still is.
+    pub(crate) if_over_since: Option<u64>,
 }
 
 /// What becomes of the finished frames of a job that is forgotten.

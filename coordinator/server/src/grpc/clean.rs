@@ -40,10 +40,14 @@ pub(super) async fn clean(
                 false => Frames::Stay,
             };
             let command = Command::Remove;
-            let wish = Wish { command, frames };
+            let wish = Wish {
+                command,
+                frames,
+                if_over_since: Some(job.finished_unix_ms),
+            };
             let removed = door.ask(|reply| Input::Command(id, wish, reply)).await;
             if let Err(failure) = removed {
-                // Others wait for it, or it has just gone.
+                // Others wait for it, it has just gone, or it goes on again.
                 tracing::info!(job = %id, "a job is not cleaned away: {failure}");
                 continue;
             }

@@ -1,5 +1,7 @@
 //! A worker's control stream.
 
+use std::collections::BTreeSet;
+
 use model::{Revision, Span, WorkerId};
 use sched::{Event, LinkId};
 use tokio::sync::{mpsc, oneshot};
@@ -18,6 +20,9 @@ const ATTEMPTS_MAX: usize = 65_536;
 
 /// Most tiles that a worker may say it renders.
 const RUNNING_MAX: usize = 4_096;
+
+/// Most bytes of a worker's labels together.
+const LABELS_BYTES_MAX: u64 = 256;
 
 /// Most bytes of a sentence that a worker says.
 const SENTENCE_BYTES_MAX: usize = 2_000;
@@ -117,10 +122,17 @@ fn greeting(hello: proto::Hello, link: Link<proto::ControlDown>) -> Result<Greet
             build: convert::text(hello.build, "hello.build", 0..=200)?,
             simd_level: convert::text(hello.simd_level, "hello.simd_level", 0..=200)?,
             memory_bytes: hello.memory_bytes,
-            labels: labels(hello.labels, "hello.labels")?,
+            labels: few_labels(hello.labels)?,
             time_left: hello.time_left_ms.map(span),
         },
     })
+}
+
+/// All workers with their labels must fit into one message.
+fn few_labels(all: Vec<String>) -> Result<BTreeSet<String>, BadMessage> {
+    let bytes = all.iter().map(String::len).sum::<usize>() as u64;
+    convert::number(bytes, "bytes of hello.labels", 0..=LABELS_BYTES_MAX)?;
+    labels(all, "hello.labels")
 }
 
 fn span(milliseconds: u64) -> Span {

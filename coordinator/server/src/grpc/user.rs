@@ -92,6 +92,7 @@ impl Farm for Door {
         let wish = Wish {
             command: Command::Cancel,
             frames: Frames::Stay,
+            if_over_since: None,
         };
         let summary = self.ask(|reply| Input::Command(job, wish, reply)).await?;
         Ok(Response::new(summary))
@@ -124,7 +125,11 @@ impl Farm for Door {
                 return Err(Failure::new(ErrorKind::BadRequest, sentence).into());
             }
         };
-        let wish = Wish { command, frames };
+        let wish = Wish {
+            command,
+            frames,
+            if_over_since: None,
+        };
         let summary = self.ask(|reply| Input::Command(job, wish, reply)).await?;
         Ok(Response::new(summary))
     }

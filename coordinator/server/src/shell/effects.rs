@@ -121,6 +121,7 @@ impl Shell {
                 let wish = Wish {
                     command: Command::Again(image.image),
                     frames: Frames::Stay,
+                    if_over_since: None,
                 };
                 self.command(image.job, wish, reply);
             }

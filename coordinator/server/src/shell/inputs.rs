@@ -1,5 +1,7 @@
 //! From inputs to events.
 
+use std::collections::BTreeSet;
+
 use model::{ImageRef, JobId, WorkerId};
 use sched::{BlockRefusal, Event, LinkId, Offer, Verdict};
 use wire::proto::{self, ErrorKind, control_down, deliver_down};
@@ -11,6 +13,9 @@ use crate::input::{Arrived, Greeting, Input, Link, News, Reply, Wanderers, Wish}
 use crate::job::Sign;
 use crate::storage::{Encoded, Hand, Stored};
 use crate::worker::{Draining, Worker};
+
+/// Most workers that are named when some are to leave.
+const DRAINED_MAX: usize = 1_000;
 
 impl Shell {
     /// Hears what the coordinator itself has to say.
@@ -165,7 +170,16 @@ impl Shell {
             let _ = reply.send(Err(super::views::no_job(job)));
             return;
         };
-        let Wish { command, frames } = wish;
+        let Wish {
+            command,
+            frames,
+            if_over_since,
+        } = wish;
+        if if_over_since.is_some_and(|since| since != before.finished_unix_ms) {
+            let sentence = format!("job {job} goes on again");
+            let _ = reply.send(Err(Failure::new(ErrorKind::NotReady, sentence)));
+            return;
+        }
         self.commanding.push_back(Commanding {
             command,
             frames,
@@ -175,12 +189,16 @@ impl Shell {
         self.feed(Event::Command { job, command });
     }
 
-    /// Has workers finish what they hold and leave; one that is away is told when it comes back.
+    /// Has workers finish what they hold and leave; one whose link is cut is told when it comes back, unless it is lost before.
     fn drain(&mut self, whom: &Wanderers) -> Result<proto::WorkerList, Failure> {
-        let ids: Vec<WorkerId> = match whom {
+        let ids: BTreeSet<WorkerId> = match whom {
             Wanderers::All => self.workers.keys().copied().collect(),
+            Wanderers::Named(names) if names.len() > DRAINED_MAX => {
+                let sentence = format!("at most {DRAINED_MAX} workers can be named at a time");
+                return Err(Failure::new(ErrorKind::BadRequest, sentence));
+            }
             Wanderers::Named(names) => {
-                let mut ids = Vec::new();
+                let mut ids = BTreeSet::new();
                 for name in names {
                     let called = self.workers_called(name);
                     if called.is_empty() {

@@ -29,6 +29,7 @@ impl Shell {
                 // All jobs must fit into one message.
                 let short = |summary| proto::JobSummary {
                     counters: Vec::new(),
+                    needs: None,
                     ..summary
                 };
                 let jobs = jobs.map(short).collect();
