@@ -10,6 +10,8 @@ use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
+use crate::trace::bundle::Span;
+use crate::trace::ground::{Ground, Site};
 use crate::trace::means::{self, Means};
 use crate::trace::methods::tests::reference::truth;
 use crate::trace::methods::tests::surfaces::surfaces;
@@ -334,12 +336,75 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
             })
             .collect();
         let (hits, counts) = trace(&surface, Goal::Distance, &rays);
-        assert!(counts.cone_steps > 0 || surface.walks(), "{name}");
+        assert!(
+            counts.cone_steps > 0 || surface.walks() || surface.ground.is_some(),
+            "{name}"
+        );
         for (ray, hit) in rays.iter().zip(&hits) {
             let (alone, _) = trace(&surface, Goal::Distance, std::slice::from_ref(ray));
             assert_eq!(alone[0], *hit, "{name}: {ray:?}");
         }
         assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
+    }
+}
+
+#[test]
+fn where_the_ground_is_clear_the_field_is_positive() {
+    let mut scene = scenes::ridges();
+    scene.film.resolution.width = 400;
+    let view = View::new(&scene.camera, &scene.film, 0.0);
+    let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+    let mut scratch = Scratch::new();
+    for (rays, least) in [(1.0, 0.2), (1e4, 0.4), (1e7, 0.5)] {
+        let ground = Ground::new(&Site {
+            field: &surface.program,
+            bound: &surface.bound,
+            footprint: surface.footprint,
+            eye: view.eye(),
+            travel: view.travel(),
+            nearest: 0.1,
+            rays,
+        })
+        .unwrap();
+        let (mut way, mut led) = (0.0, 0.0);
+        for index in 0..400u32 {
+            let random = |dimension| unit(hash(&[index, dimension, 11]));
+            let sight = view.sight(&Sample {
+                place: [400.0 * random(0), 300.0 * random(1)],
+                instant: random(2),
+            });
+            let ray = surface.ray(&sight);
+            let Some((clear, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
+                continue;
+            };
+            let mut spans = [Span { ray: 0, clear, end }];
+            let never = AtomicBool::new(false);
+            let rays = std::slice::from_ref(&ray);
+            ground
+                .lead(&surface.program, rays, &mut spans, &never)
+                .unwrap();
+            let far = spans[0].clear;
+            assert!((clear..=end).contains(&far));
+            let distances: Vec<f64> = (0..=500)
+                .map(|i| clear + (far - clear) * f64::from(i) / 500.0)
+                .collect();
+            let mut values = Values {
+                surface: &surface,
+                ray: &ray,
+                scratch: &mut scratch,
+            };
+            let (values, _) = values.at(&distances);
+            assert!(
+                far == clear || values.iter().all(|value| *value > 0.0),
+                "{ray:?}"
+            );
+            let (hits, _) = trace(&surface, Goal::Distance, std::slice::from_ref(&ray));
+            if let Some(hit) = hits[0].distance() {
+                way += hit - clear;
+                led += far - clear;
+            }
+        }
+        assert!(led > least * way, "{rays} rays: {led} of {way}");
     }
 }
 

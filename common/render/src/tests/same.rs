@@ -137,7 +137,10 @@ fn a_clock_changes_neither_pixels_nor_counts() {
 fn no_technique_of_the_tracer_changes_a_pixel() {
     for technique in Technique::ALL {
         let mut is_of_use = false;
-        for (name, scene) in scenes::all() {
+        for (name, scene) in scenes::all()
+            .into_iter()
+            .chain([("crags", scenes::crags())])
+        {
             let settings = EvalSettings::default();
             let (reference, counts) = image(&scene, settings);
             let without = ImageRenderer::without(

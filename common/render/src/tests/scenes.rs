@@ -193,6 +193,26 @@ pub(super) fn ridges() -> Description {
     scene
 }
 
+/// Musgrave's ridges from low above them, every octave everywhere: their bound is far steeper than they are.
+pub(super) fn crags() -> Description {
+    let mut fields = Fields::new();
+    let p = fields.position();
+    let z = fields.op(Op::Z, &[p], &[]);
+    let ground = fields.op(Op::OntoPlane, &[p], &[]);
+    let frequency = fields.number(0.125);
+    let place = fields.op(Op::Scale, &[ground, frequency], &[]);
+    let ridged = [7.0, 2.0, 1.0, 8.0, 1.0, 2.0, 0.0];
+    let ridged = fields.op(Op::RidgedMultifractal, &[place], &ridged);
+    let height = fields.number(1.6);
+    let height = fields.op(Op::Mul, &[ridged, height], &[]);
+    let field = fields.op(Op::Sub, &[z, height], &[]);
+    let bound = Bound::Box {
+        min: [-80.0, -2.0, -0.05],
+        max: [80.0, 130.0, 3.2],
+    };
+    standing(fields.0, field, bound, [0.0, 0.0, 2.6])
+}
+
 /// Mountains of a few metres on a planet of the Earth's radius, from 15 m above it, in flight.
 pub(super) fn planet() -> Description {
     let mut fields = Fields::new();

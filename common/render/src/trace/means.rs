@@ -121,8 +121,9 @@ const SIDE: u32 = 4;
 /// no field can make preparing an image take long.
 pub(crate) const STEPS_MAX: f64 = 1024.0;
 
-/// The means by which the rays of `view` need least, of those allowed; ranges where all of them need many.
-pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Means {
+/// The means by which the rays of `view` need least, of those allowed, or ranges where all of them need many; and what a
+/// ray then costs, in evaluations of a value.
+pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> (Means, f64) {
     let rays = rays(surface, view);
     let mut tracer = Tracer::default();
     let mut best = (Means::Values, f64::INFINITY);
@@ -136,11 +137,12 @@ pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> Mea
         let ranges = Means::Ranges(Arithmetic::Reduced);
         let few: Vec<_> = rays.into_iter().step_by(FEW).collect();
         let steps_max = PATIENCE * best.1 / ranges.cost();
-        if cost(surface, &mut tracer, &few, ranges, steps_max) < best.1 {
-            return ranges;
+        let cost = cost(surface, &mut tracer, &few, ranges, steps_max);
+        if cost < best.1 {
+            return (ranges, cost);
         }
     }
-    best.0
+    best
 }
 
 /// What a ray costs on average, in evaluations of a value.

@@ -10,6 +10,7 @@ pub(crate) mod bracket;
 pub(crate) mod bundle;
 pub(crate) mod clearance;
 pub(crate) mod grid;
+pub(crate) mod ground;
 pub(crate) mod means;
 pub mod methods;
 pub(crate) mod polish;

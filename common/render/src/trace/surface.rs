@@ -9,6 +9,7 @@ use scene::description::{Bound, Seed};
 
 use super::clearance::{Around, Clearances};
 use super::grid::Grid;
+use super::ground::{self, Ground, Site};
 use super::means::{self, Means};
 use super::search::STEPS_MAX;
 use super::split::split;
@@ -46,6 +47,8 @@ pub(crate) struct Surface {
     pub(crate) sight: Grid,
     /// Whether the field changes while the shutter is open.
     pub(crate) moves: bool,
+    /// Where heights are tabled above which nothing need be looked at.
+    pub(crate) ground: Option<Arc<Ground>>,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
     /// Most evaluations along one ray.
@@ -106,7 +109,22 @@ impl Surface {
             travel: view.travel(),
             without,
         };
-        let clearances = Arc::new(Clearances::new(&around, nearest(&program, level, view)));
+        let nearest = nearest(&program, level, view);
+        let [width, height] = view.size();
+        let rays = f64::from(description.sampling.rays);
+        let site = Site {
+            field: &program,
+            bound: &surface.bound,
+            footprint,
+            eye: view.eye(),
+            travel: view.travel(),
+            nearest,
+            rays: width * height * rays * rays,
+        };
+        let has_ground = rest.is_some() && !program.moves() && Technique::Ground.is_used(without);
+        let ground = Some(site).filter(|_| has_ground);
+        let ground = ground.and_then(|site| Ground::new(&site)).map(Arc::new);
+        let clearances = Arc::new(Clearances::new(&around, nearest));
         let sight = if footprint.angle > 0.0 {
             Grid::from_eye(footprint.angle * SHARE)
         } else {
@@ -115,6 +133,7 @@ impl Surface {
         };
         let mut surface = Self {
             moves: program.moves(),
+            ground: None,
             means: Means::Values,
             steps_max: STEPS_MAX,
             is_partial: false,
@@ -134,15 +153,35 @@ impl Surface {
             Means::Tangents => surface.clearances.have_tangents() && is_used(Technique::Tangents),
             Means::Stretches => looks_ahead && is_used(Technique::Stretches),
         };
-        surface.means = match means {
-            Some(means) if is_known(&means) => means,
-            Some(_) => Means::Values,
-            None => {
-                let all = [Means::Values, Means::Tangents, Means::Stretches];
-                let allowed: Vec<_> = all.into_iter().filter(is_known).collect();
-                means::cheapest(&surface, view, &allowed)
-            }
+        let all = [Means::Values, Means::Tangents, Means::Stretches];
+        let allowed: Vec<_> = match means {
+            Some(means) if is_known(&means) => vec![means],
+            Some(_) => vec![Means::Values],
+            None => all.into_iter().filter(is_known).collect(),
         };
+        let ranges = allowed
+            .iter()
+            .any(|means| matches!(means, Means::Ranges(_)));
+        let ground = ground.filter(|_| !ranges);
+        surface.means = allowed[0];
+        if means.is_some() && ground.is_none() {
+            return Ok(surface);
+        }
+        let (cheapest, cost) = means::cheapest(&surface, view, &allowed);
+        surface.means = cheapest;
+        if ground.is_some() {
+            let led = Self {
+                ground,
+                ..surface.clone()
+            };
+            let (cheapest, led_cost) = means::cheapest(&led, view, &allowed);
+            if led_cost + ground::COST < cost {
+                surface = Self {
+                    means: cheapest,
+                    ..led
+                };
+            }
+        }
         Ok(surface)
     }
 

@@ -21,6 +21,8 @@ pub enum Technique {
     Distances,
     /// What of the field cannot matter to the rays of a few pixels is left out of their program.
     Choices,
+    /// Rays are led over cells of the ground that were proven clear up to a height.
+    Ground,
     /// Samples are followed along a Morton curve.
     Curve,
     /// Samples are followed by slices of the shutter.
@@ -29,7 +31,7 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Bundles,
         Self::Tangents,
         Self::Stretches,
@@ -38,6 +40,7 @@ impl Technique {
         Self::Levels,
         Self::Distances,
         Self::Choices,
+        Self::Ground,
         Self::Curve,
         Self::Slices,
     ];
@@ -53,6 +56,7 @@ impl Technique {
             Self::Levels => "levels by value",
             Self::Distances => "tables by distance",
             Self::Choices => "simplified programs",
+            Self::Ground => "clear ground",
             Self::Curve => "Morton curve",
             Self::Slices => "shutter slices",
         }

@@ -179,8 +179,13 @@ impl Tracer {
                 end,
             })
         }));
-        // Rays that walk to their ends by themselves gain nothing by going together.
-        if Technique::Bundles.is_used(surface.without) && !surface.walks() {
+        // Close to the surface, where rays towards the sun begin, cells of the ground say nothing.
+        let ground = surface.ground.as_ref();
+        let ground = ground.filter(|_| goal == Goal::Distance && !surface.walks());
+        if let Some(ground) = ground {
+            ground.lead(&whole.program, rays, spans, wanted.cancel)?;
+        } else if Technique::Bundles.is_used(surface.without) && !surface.walks() {
+            // Rays that walk to their ends by themselves gain nothing by going together.
             bundles.approach(surface, rays, spans, scratch, counts);
         }
         let results = Results {
