@@ -1,6 +1,7 @@
 //! A coordinator, its workers and its jobs.
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -58,6 +59,14 @@ impl Farm {
         let address = self.address.to_string();
         self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
         assert_eq!(says_where(&self.place, &mut self.coordinator), self.address);
+    }
+
+    /// Starts the coordinator again and kills it after a while, whether it listens by then or not.
+    pub(crate) fn start_and_kill(&mut self, a_while: Duration) {
+        let address = self.address.to_string();
+        self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
+        thread::sleep(a_while);
+        self.coordinator.kill();
     }
 
     /// A farm of `count` workers of one thread each.

@@ -47,13 +47,15 @@ const ONE_THREAD: [&str; 2] = ["--threads", "1"];
 
 #[test]
 fn three_rounds() {
-    Chaos::new(number_from("FLYBY_CHAOS_KEY").unwrap_or(1)).rounds(3);
+    // A frozen worker, a full disk, a killed worker, and two coordinators that are killed meanwhile.
+    Chaos::new(number_from("FLYBY_CHAOS_KEY").unwrap_or(45)).rounds(3);
 }
 
 #[test]
 #[ignore = "long: tests/run --all"]
 fn twenty_rounds() {
-    let key = number_from("FLYBY_CHAOS_KEY").unwrap_or(2);
+    // Every kind of trouble.
+    let key = number_from("FLYBY_CHAOS_KEY").unwrap_or(34);
     Chaos::new(key).rounds(number_from("FLYBY_CHAOS_ROUNDS").unwrap_or(20));
 }
 
@@ -91,7 +93,7 @@ struct Tally {
 
 impl Chaos {
     fn new(key: u64) -> Self {
-        println!("FLYBY_CHAOS_KEY={key}");
+        eprintln!("FLYBY_CHAOS_KEY={key}");
         let place = Place::new();
         let disk = SmallDisk::mount(&place, DISK);
         let wrapper = disk.as_ref().map(SmallDisk::wrapper).unwrap_or_default();
@@ -123,19 +125,25 @@ impl Chaos {
                 self.job = submit(&self.farm);
             }
             let round = self.rounds.draw();
-            println!("round {number}, job {}: {round:?}", self.job);
+            eprintln!("round {number}, job {}: {round:?}", self.job);
             let start = Instant::now();
+            let before = (self.witness.leases, self.witness.rendered_twice);
             self.round(round);
-            println!("  {:.1} s", start.elapsed().as_secs_f64());
+            eprintln!(
+                "  {:.1} s, {} tiles leased, {} blocks came of two",
+                start.elapsed().as_secs_f64(),
+                self.witness.leases - before.0,
+                self.witness.rendered_twice - before.1
+            );
         }
         self.farm.wait_done(self.job);
         self.job_is_right();
-        println!(
+        // But for acknowledgements that a killed coordinator had decided and not come to, the witness saw them all.
+        let acknowledged = self.witness.acknowledged_count() as u64;
+        assert!(acknowledged * 10 >= self.tally.blocks * 9 && self.witness.leases > 0);
+        eprintln!(
             "{:#?}\n{} tiles leased, {} blocks acknowledged, none leased after that; {} leased to two before",
-            self.tally,
-            self.witness.leases,
-            self.witness.acknowledged_count(),
-            self.witness.rendered_twice
+            self.tally, self.witness.leases, acknowledged, self.witness.rendered_twice
         );
     }
 
@@ -155,7 +163,14 @@ impl Chaos {
 
     fn make(&mut self, trouble: Trouble) {
         match trouble {
-            Trouble::KillCoordinator => self.kill_coordinator(),
+            Trouble::KillCoordinator => self.kill_coordinator(|_| ()),
+            Trouble::KillCoordinatorAsItStarts(a_while) => {
+                self.kill_coordinator(|chaos| {
+                    chaos.farm.start_and_kill(a_while);
+                    chaos.witness.read(&chaos.farm.coordinator);
+                    chaos.witness.another();
+                });
+            }
             Trouble::FreezeCoordinator(a_while) => {
                 let before = self.blocks_done();
                 self.farm.coordinator.signal(Signal::Stop);
@@ -181,12 +196,12 @@ impl Chaos {
                 self.while_frozen(self.links_of(links).count(), until, meanwhile);
                 self.links_of(links).for_each(Proxy::thaw);
             }
-            Trouble::FillDisk => self.fill_disk(),
+            Trouble::FillDisk(meanwhile) => self.fill_disk(meanwhile),
         }
     }
 
-    /// What was acknowledged is there again.
-    fn kill_coordinator(&mut self) {
+    /// Kills the coordinator and starts another, with something in between; what was acknowledged is there again.
+    fn kill_coordinator(&mut self, in_between: impl FnOnce(&mut Self)) {
         let before = self.job_now();
         self.again += before.number("blocks_again");
         self.tally.blocks_twice += before.number("blocks_twice");
@@ -194,6 +209,7 @@ impl Chaos {
         self.farm.coordinator.kill();
         self.witness.read(&self.farm.coordinator);
         self.witness.another();
+        in_between(self);
         self.farm.start_again();
         self.tally.restarts += 1;
         let after = self.blocks_done();
@@ -202,7 +218,7 @@ impl Chaos {
 
     fn while_frozen(&mut self, away: usize, until: Until, meanwhile: Meanwhile) {
         if meanwhile == Meanwhile::KillCoordinator {
-            self.kill_coordinator();
+            self.kill_coordinator(|_| ());
         }
         match until {
             Until::Missed => wait::until("whoever is frozen is missed", || {
@@ -223,17 +239,24 @@ impl Chaos {
     }
 
     /// Until the coordinator says that it waits, or needs no more room for this job.
-    fn fill_disk(&self) {
-        let disk = self.disk.as_ref().expect("it is drawn only then");
+    fn fill_disk(&mut self, meanwhile: Meanwhile) {
         let job = self.job.to_string();
         wait::until("the coordinator says that it waits for its disk", || {
             // What it frees meanwhile is taken too.
-            disk.fill();
+            self.disk().fill();
             let why = self.farm.flyby(["job", "why", &job]).ok();
             let waits = why.contains("the coordinator waits for its disk");
             (waits || self.job_now().is_over()).then_some(())
         });
-        disk.empty();
+        match meanwhile {
+            Meanwhile::Nothing => self.disk().empty(),
+            Meanwhile::KillCoordinator => self.kill_coordinator(|chaos| chaos.disk().empty()),
+        }
+    }
+
+    fn disk(&self) -> &SmallDisk {
+        let disk = self.disk.as_ref();
+        disk.expect("where there is none, it is not drawn")
     }
 
     fn job_now(&self) -> Job {

@@ -17,6 +17,8 @@ pub(super) struct Round {
 pub(super) enum Trouble {
     /// `kill -9`, and another is started over its state.
     KillCoordinator,
+    /// The same, but the first that is started is killed too, so long after its start: as it begins, or reads its state.
+    KillCoordinatorAsItStarts(Duration),
     /// Frozen, and thawed after a while. Nobody can be asked meanwhile, so no condition ends it.
     FreezeCoordinator(Duration),
     /// `kill -9`, and another worker is started.
@@ -27,12 +29,13 @@ pub(super) enum Trouble {
     CutLinks(Links),
     /// Nothing passes these links, though they stay open.
     FreezeLinks(Links, Until, Meanwhile),
-    /// No room is left on the disk of the state folder until the coordinator says that it waits for it.
-    FillDisk,
+    /// No room is left on the disk of the state folder until the coordinator says that it waits for it; it
+    /// may be killed as it waits, and is started when there is room.
+    FillDisk(Meanwhile),
 }
 
 /// How many kinds of trouble there are, of which the last needs a disk that can be filled.
-const KINDS: u64 = 7;
+const KINDS: u64 = 8;
 
 /// Some of the links that lead through a proxy.
 pub(super) type Links = [bool; LINKS];
@@ -46,7 +49,7 @@ pub(super) enum Until {
     OthersDeliver(u64),
 }
 
-/// What else happens while something is frozen.
+/// What else happens while something is frozen or full.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
 pub(super) enum Meanwhile {
     Nothing,
@@ -58,6 +61,7 @@ impl Trouble {
     pub(super) fn name(self) -> &'static str {
         match self {
             Self::KillCoordinator => "coordinator killed",
+            Self::KillCoordinatorAsItStarts(_) => "coordinator killed, and as it starts",
             Self::FreezeCoordinator(_) => "coordinator frozen",
             Self::KillWorker(_) => "worker killed",
             Self::FreezeWorker(_, _, Meanwhile::Nothing) => "worker frozen",
@@ -65,7 +69,8 @@ impl Trouble {
             Self::CutLinks(_) => "links cut",
             Self::FreezeLinks(_, _, Meanwhile::Nothing) => "links frozen",
             Self::FreezeLinks(..) => "links frozen, coordinator killed",
-            Self::FillDisk => "disk full",
+            Self::FillDisk(Meanwhile::Nothing) => "disk full",
+            Self::FillDisk(_) => "disk full, coordinator killed",
         }
     }
 
@@ -73,7 +78,10 @@ impl Trouble {
     pub(super) fn parts_a_worker(self) -> bool {
         !matches!(
             self,
-            Self::KillCoordinator | Self::FreezeCoordinator(_) | Self::FillDisk
+            Self::KillCoordinator
+                | Self::KillCoordinatorAsItStarts(_)
+                | Self::FreezeCoordinator(_)
+                | Self::FillDisk(_)
         )
     }
 }
@@ -101,14 +109,9 @@ impl Rounds {
         let worker = usize::try_from(self.below(WORKERS as u64)).unwrap();
         let links = [[true, false], [false, true], [true, true]];
         let links = links[usize::try_from(self.below(3)).unwrap()];
-        let until = match self.below(2) {
-            0 => Until::Missed,
-            _ => Until::OthersDeliver(1),
-        };
-        let more = self.below(8);
-        let until = match until {
-            Until::OthersDeliver(least) => Until::OthersDeliver(least + more),
-            Until::Missed => Until::Missed,
+        let until = match self.below(16) {
+            blocks @ 1..=8 => Until::OthersDeliver(blocks),
+            _ => Until::Missed,
         };
         let meanwhile = match self.below(3) {
             0 => Meanwhile::KillCoordinator,
@@ -117,12 +120,14 @@ impl Rounds {
         let a_while = Duration::from_millis(100 + self.below(2_900));
         let trouble = match kind {
             0 => Trouble::KillCoordinator,
-            1 => Trouble::FreezeCoordinator(a_while),
-            2 => Trouble::KillWorker(worker),
-            3 => Trouble::FreezeWorker(worker, until, meanwhile),
-            4 => Trouble::CutLinks(links),
-            5 => Trouble::FreezeLinks(links, until, meanwhile),
-            _ => Trouble::FillDisk,
+            // A start takes some ten milliseconds.
+            1 => Trouble::KillCoordinatorAsItStarts(a_while / 50),
+            2 => Trouble::FreezeCoordinator(a_while),
+            3 => Trouble::KillWorker(worker),
+            4 => Trouble::FreezeWorker(worker, until, meanwhile),
+            5 => Trouble::CutLinks(links),
+            6 => Trouble::FreezeLinks(links, until, meanwhile),
+            _ => Trouble::FillDisk(meanwhile),
         };
         Round {
             after_blocks,
