@@ -10,14 +10,15 @@ use crate::harness::scenes::{FLYBY, slow};
 use crate::harness::{Farm, Job, Proxy, Signal, wait};
 
 /// Limits short enough for a test to wait for them.
-const SHORT_LIMITS: [&str; 2] = ["--liveness", "1500 ms"];
+pub(crate) const SHORT_LIMITS: [&str; 2] = ["--liveness", "1500 ms"];
 
-fn submit(farm: &Farm) -> u64 {
+/// Submits the slow job, in tiles of a few blocks each.
+pub(crate) fn submit(farm: &Farm) -> u64 {
     farm.submit(&slow().with(&[FLYBY, "--tile", "40x30"]))
 }
 
 /// How many blocks the job has: two images of 200×150 pixels in those tiles.
-fn blocks() -> u64 {
+pub(crate) fn blocks() -> u64 {
     let rows = (0..150).step_by(30);
     let tiles = rows.flat_map(|y0| (0..200).step_by(40).map(move |x0| (x0, y0)));
     let rect = |(x0, y0)| Rect {

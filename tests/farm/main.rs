@@ -15,6 +15,7 @@ mod bad_places;
 mod bad_scenes;
 mod bad_words;
 mod cancel;
+mod chaos;
 mod commands;
 mod demo;
 mod doctor;

@@ -1,6 +1,7 @@
 //! A coordinator, its workers and its jobs.
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
@@ -17,6 +18,9 @@ pub(crate) struct Farm {
     pub(crate) address: SocketAddr,
     /// Where everything lies.
     pub(crate) place: Place,
+    /// What its coordinator is started by, and with which further options, each time.
+    wrapper: Vec<String>,
+    options: Vec<String>,
 }
 
 impl Farm {
@@ -28,32 +32,41 @@ impl Farm {
     /// [`Farm::new`] in a place that a test has prepared, its coordinator started by another
     /// program that is given `wrapper`'s further words.
     pub(crate) fn wrapped(place: Place, wrapper: &[&str], options: &[&str]) -> Self {
-        let command = [
-            "coordinator",
-            "--while-input-open",
-            "--listen",
-            "127.0.0.1:0",
-        ];
-        let arguments = command.iter().chain(options);
-        let command = place.wrapped(wrapper, arguments);
-        let mut coordinator = place.start_command("coordinator", command);
+        let kept = |words: &[&str]| {
+            words
+                .iter()
+                .map(|&word| word.to_owned())
+                .collect::<Vec<_>>()
+        };
+        let (wrapper, options) = (kept(wrapper), kept(options));
+        let mut coordinator = start_coordinator(&place, "127.0.0.1:0", &wrapper, &options);
         let address = says_where(&place, &mut coordinator);
         Self {
             workers: Vec::new(),
             coordinator,
             address,
             place,
+            wrapper,
+            options,
         }
     }
 
-    /// Starts the coordinator again that was killed or has ended, where it was, over the same state.
+    /// Starts the coordinator again that was killed or has ended, as it was started first, where it
+    /// was, over the same state.
     pub(crate) fn start_again(&mut self) {
         // One that was killed could not take it back.
         let _ = std::fs::remove_file(self.place.state().join("coordinator.json"));
         let address = self.address.to_string();
-        let command = ["coordinator", "--while-input-open", "--listen", &address];
-        self.coordinator = self.place.start("coordinator", command);
+        self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
         assert_eq!(says_where(&self.place, &mut self.coordinator), self.address);
+    }
+
+    /// Starts the coordinator again and kills it after a while, whether it listens by then or not.
+    pub(crate) fn start_and_kill(&mut self, a_while: Duration) {
+        let address = self.address.to_string();
+        self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
+        thread::sleep(a_while);
+        self.coordinator.kill();
     }
 
     /// A farm of `count` workers of one thread each.
@@ -78,6 +91,12 @@ impl Farm {
         let worker = self.place.start(&name, command.iter().chain(options));
         self.workers.push(worker);
         self.workers.len() - 1
+    }
+
+    /// Puts another worker, in a process of its own, in the place of one that has ended.
+    pub(crate) fn replace_worker(&mut self, place: usize, address: SocketAddr, options: &[&str]) {
+        self.worker_through(address, options);
+        self.workers.swap_remove(place);
     }
 
     /// Runs a command that speaks with this coordinator.
@@ -136,18 +155,39 @@ impl Farm {
         job
     }
 
+    /// How many workers the coordinator counts as connected.
+    #[track_caller]
+    pub(crate) fn connected(&self) -> usize {
+        let list = self.flyby(["worker", "list", "--output", "json"]).json();
+        let workers = list["workers"].as_array().unwrap();
+        let connected = workers
+            .iter()
+            .filter(|worker| worker["state"] == "connected");
+        connected.count()
+    }
+
     /// Waits until the coordinator counts `count` workers as connected.
     #[track_caller]
     pub(crate) fn wait_connected(&self, count: usize) {
         wait::until(&format!("{count} workers are connected"), || {
-            let list = self.flyby(["worker", "list", "--output", "json"]).json();
-            let workers = list["workers"].as_array().unwrap();
-            let connected = workers
-                .iter()
-                .filter(|worker| worker["state"] == "connected");
-            (connected.count() == count).then_some(())
+            (self.connected() == count).then_some(())
         });
     }
+}
+
+fn start_coordinator(
+    place: &Place,
+    listen: &str,
+    wrapper: &[String],
+    options: &[String],
+) -> Process {
+    let command = ["coordinator", "--while-input-open", "--listen", listen];
+    let wrapper: Vec<_> = wrapper.iter().map(String::as_str).collect();
+    let options = options.iter().map(String::as_str);
+    place.start_command(
+        "coordinator",
+        place.wrapped(&wrapper, command.into_iter().chain(options)),
+    )
 }
 
 /// Where a coordinator that was just started says that it listens.

@@ -5,6 +5,7 @@
 //! - [`Process`]: one running process; killed, with all it started, when it is dropped.
 //! - [`Farm`]: a coordinator, its workers and its jobs.
 //! - [`Proxy`]: a link between a worker and its coordinator that can be cut and frozen.
+//! - [`SmallDisk`]: a state folder on a disk of its own, which can be filled.
 //! - [`raw`]: a client that says to a coordinator what no worker of ours would say.
 //! - [`wait`]: waiting for conditions; nothing here sleeps for a time and hopes.
 //! - [`need`]: tools that a machine may lack.
@@ -12,6 +13,7 @@
 //! When a test fails, what its processes wrote is printed as they are dropped.
 
 mod command;
+mod disk;
 mod farm;
 mod job;
 pub(crate) mod need;
@@ -23,6 +25,7 @@ pub(crate) mod scenes;
 pub(crate) mod wait;
 
 pub(crate) use command::Outcome;
+pub(crate) use disk::SmallDisk;
 pub(crate) use farm::{Farm, free_address};
 pub(crate) use job::Job;
 pub(crate) use place::Place;

@@ -56,6 +56,11 @@ impl Process {
         }
     }
 
+    /// Its number.
+    pub(crate) fn id(&self) -> u32 {
+        self.child.id()
+    }
+
     /// What it wrote to its standard output so far.
     pub(crate) fn stdout(&self) -> String {
         read(&self.stdout)
