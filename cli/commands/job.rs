@@ -19,7 +19,7 @@ use crate::existing::stem;
 use crate::farm::fetch::{Fetched, Fetcher};
 use crate::farm::follow::{Follower, ending};
 use crate::farm::link::{block_on, refused};
-use crate::farm::view::{self, Image, Job, Jobs, Whole};
+use crate::farm::view::{self, Image, Job, Jobs, Reason, Whole};
 use crate::options::{Context, Existing, FarmOptions};
 use crate::output::{self, Report, say};
 use crate::stop::Stop;
@@ -405,27 +405,15 @@ async fn want(
     Ok(Ending::Done)
 }
 
-/// `job why`.
+/// What `job why` asks about.
 #[derive(Serialize)]
-struct Reason {
+struct Asked {
     /// The job.
     job: u64,
     /// The frame asked for; null is the job as a whole.
     frame: Option<u32>,
     /// The pixel asked for, column and row; null is the frame as a whole.
     pixel: Option<(u32, u32)>,
-    /// Why it is not finished, a sentence.
-    why: String,
-}
-
-impl Report for Reason {
-    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{}", self.why)
-    }
-
-    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.table(out)
-    }
 }
 
 async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
@@ -441,9 +429,11 @@ async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
         .await
         .map_err(|status| refused(format!("cannot say why job {job} waits"), status))?;
     let reason = Reason {
-        job,
-        frame: options.frame,
-        pixel: options.pixel,
+        asked: Asked {
+            job,
+            frame: options.frame,
+            pixel: options.pixel,
+        },
         why: answer.into_inner().sentence,
     };
     output::print(context.output, &reason)?;

@@ -1,7 +1,6 @@
 //! `flyby worker`: runs a worker until it is told to stop; with a verb, manages workers.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
 use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,9 +17,9 @@ use super::render::processors;
 use crate::daemon::{self, DaemonOptions};
 use crate::error::{Ending, Error};
 use crate::farm::link::{block_on, refused};
-use crate::farm::view::{self, Workers};
+use crate::farm::view::{self, Reason, Workers};
 use crate::options::{Context, FarmOptions};
-use crate::output::{self, Report};
+use crate::output;
 use crate::stop::Stop;
 use crate::values;
 
@@ -117,23 +116,11 @@ pub(crate) fn run(context: &Context, command: WorkerCommand) -> Result<Ending, E
     }
 }
 
-/// `worker why`.
+/// What `worker why` asks about.
 #[derive(Serialize)]
-struct Reason {
+struct Asked {
     /// The worker, as it was asked for.
     worker: String,
-    /// Why it has not more to do, a sentence.
-    why: String,
-}
-
-impl Report for Reason {
-    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
-        writeln!(out, "{}", self.why)
-    }
-
-    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
-        self.table(out)
-    }
 }
 
 async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
@@ -146,7 +133,9 @@ async fn why(context: &Context, options: &Why) -> Result<Ending, Error> {
         .await
         .map_err(|status| refused("cannot say why the worker waits", status))?;
     let reason = Reason {
-        worker: options.named.clone(),
+        asked: Asked {
+            worker: options.named.clone(),
+        },
         why: answer.into_inner().sentence,
     };
     output::print(context.output, &reason)?;

@@ -178,6 +178,26 @@ pub(crate) struct Whole {
     pub(crate) images: Vec<Image>,
 }
 
+/// `job why` and `worker why`.
+#[derive(Serialize)]
+pub(crate) struct Reason<T> {
+    /// What was asked about.
+    #[serde(flatten)]
+    pub(crate) asked: T,
+    /// Why it is not finished or has not more to do, a sentence.
+    pub(crate) why: String,
+}
+
+impl<T: Serialize> Report for Reason<T> {
+    fn table(&self, out: &mut dyn Write) -> io::Result<()> {
+        writeln!(out, "{}", self.why)
+    }
+
+    fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {
+        self.table(out)
+    }
+}
+
 /// `worker list`.
 #[derive(Serialize)]
 pub(crate) struct Workers {

@@ -1,12 +1,22 @@
 //! A coordinator, its workers and its jobs.
 
 use std::net::{Ipv4Addr, SocketAddr, TcpListener};
-use std::thread;
 use std::time::Duration;
 
 use serde_json::Value;
 
 use super::{Job, Outcome, Place, Process, wait};
+
+/// When a coordinator is killed that has just been started.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Moment {
+    /// Before it has done anything.
+    AtOnce,
+    /// It has counted its start, and opens its store and files.
+    Counted,
+    /// It says where it listens.
+    Listening,
+}
 
 /// A farm of real processes on loopback. Dropping it kills them all.
 pub(crate) struct Farm {
@@ -61,12 +71,40 @@ impl Farm {
         assert_eq!(says_where(&self.place, &mut self.coordinator), self.address);
     }
 
-    /// Starts the coordinator again and kills it after a while, whether it listens by then or not.
-    pub(crate) fn start_and_kill(&mut self, a_while: Duration) {
+    /// Starts the coordinator again and kills it at a moment of its start.
+    #[track_caller]
+    pub(crate) fn start_and_kill(&mut self, moment: Moment) {
+        let state = self.place.state();
+        let epoch = || std::fs::read(state.join("epoch")).ok();
+        let before = epoch();
+        // One that was killed could not take it back.
+        let _ = std::fs::remove_file(state.join("coordinator.json"));
         let address = self.address.to_string();
         self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
-        thread::sleep(a_while);
+        match moment {
+            Moment::AtOnce => {}
+            Moment::Counted => wait::until("the coordinator counts its start", || {
+                (epoch() != before).then_some(())
+            }),
+            Moment::Listening => {
+                says_where(&self.place, &mut self.coordinator);
+            }
+        }
         self.coordinator.kill();
+    }
+
+    /// Waits until the workers have taken so much processor time, all together, or none of them has anything to do.
+    #[track_caller]
+    pub(crate) fn wait_rendered(&self, time: Duration) {
+        let taken = || self.workers.iter().map(Process::cpu_time).sum::<Duration>();
+        let before = taken();
+        wait::until(
+            "the workers have rendered for a while, or all they had",
+            || {
+                let is_idle = !self.workers.iter().any(Process::is_running);
+                (is_idle || taken() >= before + time).then_some(())
+            },
+        );
     }
 
     /// A farm of `count` workers of one thread each.

@@ -26,7 +26,7 @@ pub(crate) mod wait;
 
 pub(crate) use command::Outcome;
 pub(crate) use disk::SmallDisk;
-pub(crate) use farm::{Farm, free_address};
+pub(crate) use farm::{Farm, Moment, free_address};
 pub(crate) use job::Job;
 pub(crate) use place::Place;
 pub(crate) use process::{Process, Signal};

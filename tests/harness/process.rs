@@ -19,6 +19,12 @@ pub(crate) struct Process {
     stderr: PathBuf,
 }
 
+/// The fields of `/proc/…/stat` from the third on: the second is a name in brackets, and may hold anything.
+fn fields(stat: &str) -> impl Iterator<Item = &str> {
+    let fields = stat.rsplit_once(')').map_or("", |(_, fields)| fields);
+    fields.split_whitespace()
+}
+
 /// What can be sent to a process.
 #[derive(Clone, Copy)]
 pub(crate) enum Signal {
@@ -69,6 +75,24 @@ impl Process {
     /// What it wrote to its standard error so far.
     pub(crate) fn stderr(&self) -> String {
         read(&self.stderr)
+    }
+
+    /// Processor time that it took so far; none where it is gone.
+    pub(crate) fn cpu_time(&self) -> Duration {
+        let stat = fs::read_to_string(format!("/proc/{}/stat", self.child.id()));
+        let stat = stat.unwrap_or_default();
+        // User's and system's, in hundredths of a second.
+        let ticks = fields(&stat).skip(11).take(2);
+        let ticks: u64 = ticks.filter_map(|field| field.parse::<u64>().ok()).sum();
+        Duration::from_millis(10 * ticks)
+    }
+
+    /// Whether one of its threads has something to do at this moment.
+    pub(crate) fn is_running(&self) -> bool {
+        let tasks = fs::read_dir(format!("/proc/{}/task", self.child.id()));
+        let tasks = tasks.into_iter().flatten().flatten();
+        let mut stats = tasks.filter_map(|task| fs::read_to_string(task.path().join("stat")).ok());
+        stats.any(|stat| fields(&stat).next() == Some("R"))
     }
 
     /// Sends a signal to the process alone.

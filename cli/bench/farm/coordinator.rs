@@ -3,12 +3,15 @@
 use std::fs;
 use std::net::SocketAddr;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::runtime::Runtime;
+use tokio::time::timeout;
+use tonic::Status;
 use wire::auth::Token;
 use wire::link::Farm;
-use wire::proto::{JobSummary, ListJobsRequest, WhyRequest};
+use wire::proto::job_update::Update;
+use wire::proto::{JobRequest, JobSummary, JobUpdate, ListJobsRequest, WhyRequest};
 
 use crate::error::Error;
 use crate::farm::link::refused;
@@ -20,9 +23,6 @@ const TICKS: f64 = 100.0;
 
 /// How long nothing may happen before somebody is asked why.
 const PATIENCE: Duration = Duration::from_secs(10);
-
-/// How often it is looked at.
-const LOOK_INTERVAL: Duration = Duration::from_millis(20);
 
 /// A coordinator that takes the null renderer's pixels; dropping it kills it.
 pub(crate) struct Coordinator<'a> {
@@ -88,26 +88,32 @@ impl<'a> Coordinator<'a> {
             .ok_or_else(|| Error::failed("the coordinator has lost its job"))
     }
 
-    /// Looks until `is_enough` says so of the job; answers with the job as it is then.
+    /// Watches until `is_enough` says so of the job; answers with the job as it is then.
     pub(crate) fn wait(
         &mut self,
         mut is_enough: impl FnMut(&JobSummary) -> bool,
     ) -> Result<JobSummary, Error> {
-        let mut moved = (Instant::now(), 0);
+        let job = self.job()?.job;
+        let watched = self.farm.watch_job(JobRequest { job });
+        let watched = self.runtime.block_on(watched);
+        let mut updates = watched.map_err(lost)?.into_inner();
         loop {
-            if self.stop.is_set() {
-                return Err(Error::interrupted("the measurement was stopped"));
+            let update = self.runtime.block_on(async {
+                tokio::select! {
+                    () = self.stop.wait() => Err(Error::interrupted("the measurement was stopped")),
+                    said = timeout(PATIENCE, updates.message()) => match said {
+                        Ok(said) => said.map_err(lost),
+                        // Nothing changed for too long.
+                        Err(_) => Ok(None),
+                    },
+                }
+            })?;
+            let Some(update) = update else {
+                return Err(self.stands_still(job));
+            };
+            if let Some(summary) = summary(update).filter(&mut is_enough) {
+                return Ok(summary);
             }
-            let job = self.job()?;
-            if is_enough(&job) {
-                return Ok(job);
-            }
-            if job.blocks_done != moved.1 {
-                moved = (Instant::now(), job.blocks_done);
-            } else if moved.0.elapsed() > PATIENCE {
-                return Err(self.stands_still(job.job));
-            }
-            std::thread::sleep(LOOK_INTERVAL);
         }
     }
 
@@ -123,6 +129,18 @@ impl<'a> Coordinator<'a> {
             (None, Ok(why)) => error.because(why.into_inner().sentence),
             (None, Err(status)) => error.because(status),
         }
+    }
+}
+
+fn lost(status: Status) -> Error {
+    refused("the job under measurement cannot be watched", status)
+}
+
+/// The job as an update tells it.
+fn summary(update: JobUpdate) -> Option<JobSummary> {
+    match update.update? {
+        Update::Snapshot(part) => part.summary,
+        Update::Delta(delta) => delta.summary,
     }
 }
 

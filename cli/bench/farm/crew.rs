@@ -3,16 +3,18 @@
 use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use agent::{Ask, ExitReason, RunError};
 use tokio::runtime::Runtime;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
+use tokio::time::timeout;
 use wire::auth::Token;
 
 use super::null::Null;
 use crate::error::Error;
+use crate::stop::Stop;
 
 /// Threads of each worker.
 pub(crate) const THREADS: NonZeroU32 = NonZeroU32::new(2).expect("it is not 0");
@@ -54,9 +56,14 @@ impl<'a> Crew<'a> {
         }
     }
 
-    /// When the first of them was given its first tile.
-    pub(crate) fn first(&self) -> Option<Instant> {
-        self.null.first()
+    /// Waits until the first of them renders its first tile; answers when that was, or nothing where it is not within `limit`.
+    pub(crate) fn first(&self, limit: Duration, stop: &Stop) -> Result<Option<Instant>, Error> {
+        self.runtime.block_on(async {
+            tokio::select! {
+                () = stop.wait() => Err(Error::interrupted("the measurement was stopped")),
+                first = timeout(limit, self.null.first()) => Ok(first.ok()),
+            }
+        })
     }
 
     /// Why one of them has ended by itself, if one has.

@@ -137,16 +137,8 @@ impl<'a> Bench<'a> {
         let begun = Instant::now();
         let coordinator = self.coordinator(state.path(), Some(address))?;
         let crew = self.crew(1, &coordinator);
-        let first = loop {
-            match crew.first() {
-                Some(first) => break first,
-                None if self.stop.is_set() => return Err(interrupted()),
-                None if begun.elapsed() > LEASE_TIMEOUT => {
-                    return Err(Error::failed("no tile was leased after the restart"));
-                }
-                None => std::thread::sleep(Duration::from_millis(1)),
-            }
-        };
+        let first = crew.first(LEASE_TIMEOUT, self.stop)?;
+        let first = first.ok_or_else(|| Error::failed("no tile was leased after the restart"))?;
         crew.leave();
         peak_bytes = peak_bytes.max(coordinator.peak_bytes());
         Ok(Empty {

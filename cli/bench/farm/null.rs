@@ -14,6 +14,7 @@ use agent::{Assets, Cancelled, Counters, OpenImage, Painter};
 use model::film::CHANNEL_COUNT;
 use model::{ImageNumber, Rect, Revision};
 use scene::Description;
+use tokio::sync::Notify;
 
 use crate::error::Error;
 
@@ -52,12 +53,20 @@ pub(crate) struct Null {
 #[derive(Default)]
 struct Told {
     first: OnceLock<Instant>,
+    /// Woken when that is known.
+    begun: Notify,
 }
 
 impl Null {
-    /// When it was asked for its first block.
-    pub(crate) fn first(&self) -> Option<Instant> {
-        self.told.first.get().copied()
+    /// Waits until it was asked for its first block; answers when that was.
+    pub(crate) async fn first(&self) -> Instant {
+        loop {
+            match self.told.first.get() {
+                Some(first) => return *first,
+                // Whoever wakes before this waits leaves it a permit.
+                None => self.told.begun.notified().await,
+            }
+        }
     }
 }
 
@@ -87,7 +96,9 @@ impl OpenImage for Null {
         _: &AtomicBool,
         pixels: &mut Vec<f32>,
     ) -> Result<Counters, Cancelled> {
-        self.told.first.get_or_init(Instant::now);
+        if self.told.first.get().is_none() && self.told.first.set(Instant::now()).is_ok() {
+            self.told.begun.notify_one();
+        }
         pixels.clear();
         let (width, height) = (rect.width() as usize, rect.height() as usize);
         pixels.resize(CHANNEL_COUNT * width * height, VALUE);

@@ -26,7 +26,6 @@ mod trouble;
 mod witness;
 
 use std::collections::BTreeMap;
-use std::thread;
 use std::time::Instant;
 
 use self::trouble::{Links, Meanwhile, Round, Rounds, Trouble, Until};
@@ -164,9 +163,9 @@ impl Chaos {
     fn make(&mut self, trouble: Trouble) {
         match trouble {
             Trouble::KillCoordinator => self.kill_coordinator(|_| ()),
-            Trouble::KillCoordinatorAsItStarts(a_while) => {
+            Trouble::KillCoordinatorAsItStarts(moment) => {
                 self.kill_coordinator(|chaos| {
-                    chaos.farm.start_and_kill(a_while);
+                    chaos.farm.start_and_kill(moment);
                     chaos.witness.read(&chaos.farm.coordinator);
                     chaos.witness.another();
                 });
@@ -174,7 +173,7 @@ impl Chaos {
             Trouble::FreezeCoordinator(a_while) => {
                 let before = self.blocks_done();
                 self.farm.coordinator.signal(Signal::Stop);
-                thread::sleep(a_while);
+                self.farm.wait_rendered(a_while);
                 self.farm.coordinator.signal(Signal::Continue);
                 let after = self.blocks_done();
                 assert!(after >= before, "{after} blocks of {before} are there");

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::{LINKS, WORKERS};
+use crate::harness::Moment;
 
 /// What happens in one round.
 #[derive(Clone, Copy, Debug)]
@@ -17,9 +18,9 @@ pub(super) struct Round {
 pub(super) enum Trouble {
     /// `kill -9`, and another is started over its state.
     KillCoordinator,
-    /// The same, but the first that is started is killed too, so long after its start: as it begins, or reads its state.
-    KillCoordinatorAsItStarts(Duration),
-    /// Frozen, and thawed after a while. Nobody can be asked meanwhile, so no condition ends it.
+    /// The same, but the first that is started is killed too, at some moment of its start.
+    KillCoordinatorAsItStarts(Moment),
+    /// Frozen until the workers have rendered for so long, all together, or have nothing left to render.
     FreezeCoordinator(Duration),
     /// `kill -9`, and another worker is started.
     KillWorker(usize),
@@ -120,8 +121,11 @@ impl Rounds {
         let a_while = Duration::from_millis(100 + self.below(2_900));
         let trouble = match kind {
             0 => Trouble::KillCoordinator,
-            // A start takes some ten milliseconds.
-            1 => Trouble::KillCoordinatorAsItStarts(a_while / 50),
+            1 => Trouble::KillCoordinatorAsItStarts(match a_while.as_millis() % 3 {
+                0 => Moment::AtOnce,
+                1 => Moment::Counted,
+                _ => Moment::Listening,
+            }),
             2 => Trouble::FreezeCoordinator(a_while),
             3 => Trouble::KillWorker(worker),
             4 => Trouble::FreezeWorker(worker, until, meanwhile),
