@@ -84,7 +84,7 @@ impl Aside {
     }
 
     /// Gets no tile of a job until then, whatever else; whether that is news.
-    fn is_doubted(&mut self, job: JobId, until: Timestamp) -> bool {
+    fn suspend(&mut self, job: JobId, until: Timestamp) -> bool {
         let is_new = self.job(job).is_none();
         if is_new {
             self.jobs.push((job, until));
@@ -125,7 +125,7 @@ impl Sched {
         let guilty = failed_on.iter().filter(|&&id| id != done_by);
         let guilty: Vec<Place> = guilty.filter_map(|&id| self.workers.place(id)).collect();
         for place in guilty {
-            self.is_at_fault(place, job, out);
+            self.charge_fault(place, job, out);
         }
     }
 
@@ -137,7 +137,7 @@ impl Sched {
     }
 
     /// A worker did something wrong for a job that is not the job's fault.
-    pub(crate) fn is_at_fault(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
+    pub(crate) fn charge_fault(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
         // Where most workers fail it is not their fault.
         let aside = self.jobs.get(&job).map_or(0, |job| job.aside);
         if (aside as usize + 1) * 2 > self.workers.len() {
@@ -147,11 +147,11 @@ impl Sched {
         if worker.aside.fails(job, self.now, &self.config) == Verdict::Nothing {
             return;
         }
-        self.is_set_aside(place, job, out);
+        self.set_aside(place, job, out);
     }
 
     /// A worker gets no more tiles of a job for a while.
-    fn is_set_aside(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
+    fn set_aside(&mut self, place: Place, job: JobId, out: &mut Vec<Effect>) {
         let worker = &mut self.workers[place];
         let next = worker.aside.next();
         self.timers
@@ -168,9 +168,9 @@ impl Sched {
     pub(crate) fn doubt(&mut self, id: WorkerId, job: JobId, out: &mut Vec<Effect>) {
         let until = self.now + self.config.aside;
         if let Some(place) = self.workers.place(id)
-            && self.workers[place].aside.is_doubted(job, until)
+            && self.workers[place].aside.suspend(job, until)
         {
-            self.is_set_aside(place, job, out);
+            self.set_aside(place, job, out);
         }
     }
 

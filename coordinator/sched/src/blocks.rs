@@ -114,7 +114,7 @@ impl Sched {
         if let Some((job, place)) = self.job_and_place(image)
             && job.work.get(&place).is_some_and(Work::is_finished)
         {
-            job.image_is_rendered(place);
+            job.finish_rendering(place);
             out.push(Effect::Encode { image });
         }
     }
@@ -240,8 +240,8 @@ impl Sched {
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
         let is_whole = done.seen.len() == done.rect.blocks().count();
         let is_drawn = is_whole && is_drawn(verify, image, done.region);
-        let is_doubted = verify > 0 && !done.dissent.is_empty();
-        if able > 1 && (is_drawn || is_doubted) {
+        let doubts = verify > 0 && !done.dissent.is_empty();
+        if able > 1 && (is_drawn || doubts) {
             done.verified = Verified::Due;
         }
         let live: [Option<u64>; 2] = {

@@ -71,7 +71,7 @@ impl Job {
     }
 
     /// All pixels of an image are there: notes what it cost.
-    pub(crate) fn image_is_rendered(&mut self, place: u32) {
+    pub(crate) fn finish_rendering(&mut self, place: u32) {
         if let Some(work) = self.work.remove(&place) {
             self.spread.note(work.spent);
             self.remember_makers(place, work.makers);

@@ -126,7 +126,7 @@ impl Sched {
                 self.convict(dissenter, out);
             }
             Finding::FirstWrong { dissenter, first } => {
-                self.is_incident(block, made.by, first, out);
+                self.report_incident(block, made.by, first, out);
                 // Its image is rendered again, all of it.
                 self.revoke(number, RevokeReason::RenderedAgain, out);
                 self.acquit(dissenter, block.image.job);
@@ -137,7 +137,7 @@ impl Sched {
                 check.dissent.push(made);
                 check.by.push(made.by);
                 let by = check.by.clone();
-                self.is_incident(block, made.by, first, out);
+                self.report_incident(block, made.by, first, out);
                 self.revoke(number, RevokeReason::Differs, out);
                 if self.has_another(block.image.job, &by) {
                     self.doubt(first, block.image.job, out);
@@ -146,7 +146,7 @@ impl Sched {
                 return;
             }
             Finding::Everybody => {
-                self.is_incident(block, made.by, made.by, out);
+                self.report_incident(block, made.by, made.by, out);
                 let reason = "three workers made three different pixels of one block: a machine or a renderer is at fault";
                 self.give_up(block.image, reason.into(), out);
                 return;
@@ -176,7 +176,7 @@ impl Sched {
         self.end_attempt(number);
     }
 
-    pub(crate) fn is_incident(
+    pub(crate) fn report_incident(
         &mut self,
         block: BlockRef,
         worker: WorkerId,
@@ -210,9 +210,9 @@ impl Sched {
         if let Some(tile) = tile {
             tile.dissent.push(made);
         }
-        self.is_incident(block, made.by, first, out);
+        self.report_incident(block, made.by, first, out);
         self.revoke(number, RevokeReason::Differs, out);
-        self.is_at_fault(place, job, out);
+        self.charge_fault(place, job, out);
         if self.config.verify > 0 && self.has_another(job, &[made.by, first]) {
             self.doubt(first, job, out);
             self.doubt(made.by, job, out);
