@@ -30,20 +30,20 @@ pub(crate) struct Crew<'a> {
 }
 
 impl<'a> Crew<'a> {
-    /// Starts so many workers; each comes back by itself where the coordinator is gone for a while.
+    /// Starts so many workers of so many threads each; each comes back by itself where the coordinator is gone for a while.
     pub(crate) fn start(
         runtime: &'a Runtime,
-        count: usize,
+        (count, threads): (usize, NonZeroU32),
         coordinator: SocketAddr,
         token: &Token,
+        null: Null,
     ) -> Self {
-        let null = Null::default();
         let workers = (1..=count).map(|number| {
             let config = agent::Config::new(
                 coordinator,
                 token.clone(),
                 format!("null-{number}"),
-                THREADS,
+                threads,
             );
             let (asks, heard) = mpsc::channel(1);
             let painter = Arc::new(null.clone());
@@ -79,6 +79,11 @@ impl<'a> Crew<'a> {
             Ok(Err(error)) => failed.because(error),
             Err(error) => failed.because(error),
         })
+    }
+
+    /// Has what is held back rendered.
+    pub(crate) fn let_go(&self) {
+        self.null.let_go();
     }
 
     /// Has all of them give back what they hold, and leave.

@@ -1,5 +1,6 @@
 //! What is measured, in the order in which it happens.
 
+use std::num::NonZeroU32;
 use std::path::Path;
 use std::time::{Duration, Instant};
 
@@ -12,8 +13,8 @@ use tempfile::TempDir;
 use tokio::runtime::Runtime;
 
 use super::coordinator::Coordinator;
-use super::crew::Crew;
-use super::null;
+use super::crew::{Crew, THREADS};
+use super::null::{self, Null};
 use crate::bench::clock::Clock;
 use crate::error::Error;
 use crate::farm::submit::Submission;
@@ -82,8 +83,6 @@ pub(crate) struct Empty {
     pub(crate) crew: Pace,
     /// Durable tiles rendered again after `kill -9`.
     pub(crate) again: u64,
-    /// Seconds from the start of a coordinator that knows of all tiles to its first lease.
-    pub(crate) restart: f64,
     /// The most memory that a coordinator had, in bytes.
     pub(crate) peak_bytes: Option<u64>,
 }
@@ -110,12 +109,12 @@ impl<'a> Bench<'a> {
         let submit = begun.elapsed().as_secs_f64();
 
         say("one worker");
-        let crew = self.crew(1, &coordinator);
+        let crew = self.crew((1, THREADS), &coordinator, Null::default());
         let alone = pace(&mut coordinator, tiles / 8, ALONE)?;
         crew.leave();
 
         say("sixteen workers");
-        let mut crew = self.crew(CREW, &coordinator);
+        let mut crew = self.crew((CREW, THREADS), &coordinator, Null::default());
         let done = coordinator.job()?.blocks_done;
         let half = (tiles * 5 / 8).saturating_sub(done).max(1);
         let together = pace(&mut coordinator, half, Duration::MAX)?;
@@ -131,24 +130,41 @@ impl<'a> Bench<'a> {
         crew.leave();
         let again = after.blocks_again.max(coordinator.job()?.blocks_again);
         peak_bytes = peak_bytes.max(coordinator.peak_bytes());
-        let address = coordinator.kill();
-
-        say("a restart");
-        let begun = Instant::now();
-        let coordinator = self.coordinator(state.path(), Some(address))?;
-        let crew = self.crew(1, &coordinator);
-        let first = crew.first(LEASE_TIMEOUT, self.stop)?;
-        let first = first.ok_or_else(|| Error::failed("no tile was leased after the restart"))?;
-        crew.leave();
-        peak_bytes = peak_bytes.max(coordinator.peak_bytes());
         Ok(Empty {
             submit,
             alone,
             crew: together,
             again,
-            restart: (first - begun).as_secs_f64(),
             peak_bytes,
         })
+    }
+
+    /// Seconds from the start of a coordinator to its first lease, where its store holds so many durable tiles of
+    /// images of which none is finished; of finished ones it keeps no tiles.
+    pub(crate) fn restart(&self, tiles: u64) -> Result<f64, Error> {
+        let state = self.state()?;
+        let mut coordinator = self.coordinator(state.path(), None)?;
+        // One tile of each image is held back.
+        let images = (tiles + SPARE).div_ceil(SIDE * SIDE - 1);
+        self.submit(&square(SIDE, images)?, 1, &coordinator, state.path())?;
+        let threads = u32::try_from(images).ok().and_then(|images| {
+            // Each tile that is held back holds a thread.
+            images.checked_add(THREADS.get()).and_then(NonZeroU32::new)
+        });
+        let threads = threads.ok_or_else(|| Error::failed("too many images"))?;
+        let crew = self.crew((1, threads), &coordinator, Null::holding());
+        coordinator.wait(|job| job.blocks_done >= tiles)?;
+        let address = coordinator.kill();
+        crew.let_go();
+        crew.leave();
+
+        let begun = Instant::now();
+        let coordinator = self.coordinator(state.path(), Some(address))?;
+        let crew = self.crew((1, THREADS), &coordinator, Null::default());
+        let first = crew.first(LEASE_TIMEOUT, self.stop)?;
+        let first = first.ok_or_else(|| Error::failed("no tile was leased after the restart"))?;
+        crew.leave();
+        Ok((first - begun).as_secs_f64())
     }
 
     /// Megabytes (10⁶) of whole blocks that become durable in a second, of so many blocks, by sixteen workers.
@@ -157,7 +173,7 @@ impl<'a> Bench<'a> {
         let mut coordinator = self.coordinator(state.path(), None)?;
         let scene = square(32 * ((2 * blocks).isqrt() + 1), 1)?;
         self.submit(&scene, 32, &coordinator, state.path())?;
-        let crew = self.crew(CREW, &coordinator);
+        let crew = self.crew((CREW, THREADS), &coordinator, Null::default());
         let pace = pace(&mut coordinator, blocks, Duration::MAX)?;
         crew.leave();
         Ok(pace.tiles_per_second * model::film::BLOCK_BYTES_MAX as f64 / 1e6)
@@ -180,8 +196,14 @@ impl<'a> Bench<'a> {
         Coordinator::start(self.runtime, self.stop, state, address)
     }
 
-    fn crew(&self, count: usize, coordinator: &Coordinator<'_>) -> Crew<'a> {
-        Crew::start(self.runtime, count, coordinator.address, &coordinator.token)
+    fn crew(
+        &self,
+        size: (usize, NonZeroU32),
+        coordinator: &Coordinator<'_>,
+        null: Null,
+    ) -> Crew<'a> {
+        let Coordinator { address, token, .. } = coordinator;
+        Crew::start(self.runtime, size, *address, token, null)
     }
 
     fn submit(

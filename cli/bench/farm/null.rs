@@ -6,9 +6,10 @@
 
 use std::fs;
 use std::path::Path;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::time::Instant;
+use std::thread;
+use std::time::{Duration, Instant};
 
 use agent::{Assets, Cancelled, Counters, OpenImage, Painter};
 use model::film::CHANNEL_COUNT;
@@ -26,6 +27,9 @@ const MARK: &str = "only-for-measuring";
 
 /// Every value of every pixel.
 const VALUE: f32 = 0.5;
+
+/// How often a tile that is held back looks whether it is still wanted: a cancellation wakes nobody.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Makes a state folder a measurement's.
 pub(crate) fn mark(state: &Path) -> Result<(), Error> {
@@ -55,9 +59,23 @@ struct Told {
     first: OnceLock<Instant>,
     /// Woken when that is known.
     begun: Notify,
+    /// Whether the first pixel of every image is held back.
+    holds: AtomicBool,
 }
 
 impl Null {
+    /// One that holds the first pixel of every image back, so that none is finished, until it [lets go](Self::let_go).
+    pub(crate) fn holding() -> Self {
+        let null = Self::default();
+        null.told.holds.store(true, Ordering::Relaxed);
+        null
+    }
+
+    /// Holds nothing back any more.
+    pub(crate) fn let_go(&self) {
+        self.told.holds.store(false, Ordering::Relaxed);
+    }
+
     /// Waits until it was asked for its first block; answers when that was.
     pub(crate) async fn first(&self) -> Instant {
         loop {
@@ -93,11 +111,17 @@ impl OpenImage for Null {
     fn render_block(
         &self,
         rect: Rect,
-        _: &AtomicBool,
+        cancelled: &AtomicBool,
         pixels: &mut Vec<f32>,
     ) -> Result<Counters, Cancelled> {
         if self.told.first.get().is_none() && self.told.first.set(Instant::now()).is_ok() {
             self.told.begun.notify_one();
+        }
+        while (rect.x0, rect.y0) == (0, 0) && self.told.holds.load(Ordering::Relaxed) {
+            if cancelled.load(Ordering::Relaxed) {
+                return Err(Cancelled);
+            }
+            thread::park_timeout(LOOK);
         }
         pixels.clear();
         let (width, height) = (rect.width() as usize, rect.height() as usize);

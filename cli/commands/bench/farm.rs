@@ -107,7 +107,6 @@ pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error>
         "sixteen-workers",
         "sixteen-workers-cpu",
         "killed",
-        "restart",
         "memory",
     ];
     if wants(&of_empty) {
@@ -120,10 +119,13 @@ pub(crate) fn run(context: &Context, options: &Options) -> Result<Ending, Error>
             Some(empty.crew.tiles_per_second),
             empty.crew.cpu_us,
             Some(empty.again as f64),
-            Some(empty.restart),
             memory,
         ];
         found.extend(of_empty.into_iter().zip(values));
+    }
+    if wants(&["restart"]) {
+        say("a restart");
+        found.push(("restart", Some(bench.restart(options.tiles)?)));
     }
     progress.finish();
     for row in ROWS.iter().filter(|row| wants(&[row.name])) {

@@ -39,7 +39,7 @@ impl Config {
             threads,
             ahead: threads,
             ahead_least: 1,
-            ahead_max: threads.saturating_mul(16).clamp(64, 512),
+            ahead_max: 512,
             unacked_blocks_max: threads.saturating_mul(16).max(1_024),
             backoff: Backoff::default(),
             connect_limit: Span::from_secs(10),

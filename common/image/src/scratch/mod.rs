@@ -14,6 +14,7 @@ mod journal;
 mod lock;
 mod strip;
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::os::unix::fs::FileExt;
 use std::path::{Path, PathBuf};
@@ -21,7 +22,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use model::film::CHANNELS;
-use model::{Digest, Rect, rect::SIDE_MAX};
+use model::rect::{GRID_SQUARE, SIDE_MAX};
+use model::{Digest, Rect};
 
 use self::coverage::Coverage;
 use self::grid::{Grid, SLOT_BYTES};
@@ -149,6 +151,9 @@ impl Scratch {
         let mut reader = Reader::new(&file, &path, grid);
         let mut coverage = Coverage::new(grid);
         let mut lost = Vec::new();
+        // Square by square, so that each is read once.
+        let mut blocks: Vec<_> = blocks.into_iter().collect();
+        blocks.sort_by_key(|(block, _)| (block.y0 / GRID_SQUARE, block.x0 / GRID_SQUARE));
         for (block, digest) in blocks {
             let holds = found == Found::This && reader.holds(block, digest)?;
             match holds {
@@ -236,27 +241,71 @@ impl Scratch {
     /// another length or holds a NaN or an infinity, or if the system refuses. Durable only
     /// after [`Scratch::sync`].
     pub fn write_block(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
-        self.check(block, payload)?;
-        if self.state().coverage.contains(block) {
-            return Ok(());
-        }
-        self.write_again(block, payload)?;
-        let mut state = self.state();
-        if let Some(journal) = &mut state.journal {
-            let digest = payload_digest(payload);
-            journal.append(Entry { block, digest })?;
-        }
-        state.coverage.add(block);
-        Ok(())
+        let mut verdicts = self.write_blocks(&[(block, payload)])?;
+        verdicts.pop().unwrap_or(Ok(()))
     }
 
-    /// Writes a block at its place that [`Scratch::write_block`] has taken.
+    /// Writes blocks as [`Scratch::write_block`] does, those of a square together, and says of each what is wrong
+    /// with it, if anything is; the others are written.
+    ///
+    /// Fails if the system refuses; what was written until then counts, and all may be written again.
+    pub fn write_blocks(
+        &self,
+        blocks: &[(Rect, &[u8])],
+    ) -> Result<Vec<Result<(), ImageError>>, ImageError> {
+        let checked = blocks
+            .iter()
+            .map(|(block, payload)| self.check(*block, payload));
+        let verdicts: Vec<_> = checked.collect();
+        let whole = blocks.iter().zip(&verdicts);
+        let whole = whole.filter_map(|(block, verdict)| verdict.is_ok().then_some(block));
+        for (square, mut together) in self.by_square(whole) {
+            let mut at = 0;
+            // The first to come stays, in this call too.
+            while let Some((block, _)) = together.get(at) {
+                let earlier = &together[..at];
+                let is_done = self.state().coverage.contains(*block)
+                    || earlier.iter().any(|(done, _)| done.contains(*block));
+                match is_done {
+                    true => drop(together.remove(at)),
+                    false => at += 1,
+                }
+            }
+            self.write_slot(square, &together)?;
+            let mut state = self.state();
+            for (block, payload) in together {
+                if let Some(journal) = &mut state.journal {
+                    let digest = payload_digest(payload);
+                    journal.append(Entry { block, digest })?;
+                }
+                state.coverage.add(block);
+            }
+        }
+        Ok(verdicts)
+    }
+
+    /// Writes blocks at their places that [`Scratch::write_blocks`] has taken.
     ///
     /// What was written since the last sync may be gone after one that failed, and the next one does not
     /// say so: the system counts it as written. Whoever goes on must write it again.
-    pub fn write_again(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
-        self.write_slot(block, payload)
-            .map_err(|source| ImageError::io("write a block to", &self.path, source))
+    pub fn write_again(&self, blocks: &[(Rect, &[u8])]) -> Result<(), ImageError> {
+        for (square, together) in self.by_square(blocks) {
+            self.write_slot(square, &together)?;
+        }
+        Ok(())
+    }
+
+    /// Blocks by the squares in which they lie, each square's in their order.
+    fn by_square<'b>(
+        &self,
+        blocks: impl IntoIterator<Item = &'b (Rect, &'b [u8])>,
+    ) -> BTreeMap<usize, Vec<(Rect, &'b [u8])>> {
+        let mut squares = BTreeMap::<_, Vec<_>>::new();
+        for &(block, payload) in blocks {
+            let square = self.grid.square_of(block);
+            squares.entry(square).or_default().push((block, payload));
+        }
+        squares
     }
 
     fn check(&self, block: Rect, payload: &[u8]) -> Result<(), ImageError> {
@@ -284,20 +333,28 @@ impl Scratch {
         }
     }
 
-    /// Writes into the slot of the block's square, the slot as one piece.
-    fn write_slot(&self, block: Rect, payload: &[u8]) -> std::io::Result<()> {
-        let square = self.grid.square_of(block);
+    /// Writes blocks into the slot of their square, the slot as one piece.
+    fn write_slot(&self, square: usize, blocks: &[(Rect, &[u8])]) -> Result<(), ImageError> {
         let offset = self.grid.slot_offset(square);
         let _slot = lock(&self.slots[square % SLOT_LOCKS]);
-        if payload.len() == SLOT_BYTES {
-            return self.file.write_all_at(payload, offset);
-        }
-        let mut slot = vec![0; SLOT_BYTES];
-        if block != self.grid.whole_block(square) {
-            self.file.read_exact_at(&mut slot, offset)?;
-        }
-        grid::scatter(block, payload, &mut slot);
-        self.file.write_all_at(&slot, offset)
+        let write = || match blocks {
+            [] => Ok(()),
+            [(_, payload)] if payload.len() == SLOT_BYTES => {
+                self.file.write_all_at(payload, offset)
+            }
+            blocks => {
+                let mut slot = vec![0; SLOT_BYTES];
+                let whole = self.grid.whole_block(square);
+                if blocks.iter().all(|(block, _)| *block != whole) {
+                    self.file.read_exact_at(&mut slot, offset)?;
+                }
+                for (block, payload) in blocks {
+                    grid::scatter(*block, payload, &mut slot);
+                }
+                self.file.write_all_at(&slot, offset)
+            }
+        };
+        write().map_err(|source| ImageError::io("write blocks to", &self.path, source))
     }
 
     /// Makes every block written so far durable: pixels, journal, and the files' names. Blocks may
@@ -421,11 +478,13 @@ fn write_header(
         .map_err(|source| ImageError::io("begin the scratch file", path, source))
 }
 
-/// Reads blocks back.
+/// Reads blocks back, each square once as long as its blocks follow each other.
 struct Reader<'a> {
     file: &'a File,
     path: &'a Path,
     grid: Grid,
+    /// The square whose slot was read last.
+    square: Option<usize>,
     slot: Vec<u8>,
     payload: Vec<u8>,
 }
@@ -436,6 +495,7 @@ impl<'a> Reader<'a> {
             file,
             path,
             grid,
+            square: None,
             slot: vec![0; SLOT_BYTES],
             payload: Vec::new(),
         }
@@ -446,10 +506,14 @@ impl<'a> Reader<'a> {
         if !block.is_block() || !self.grid.window().contains(block) {
             return Ok(false);
         }
-        let offset = self.grid.slot_offset(self.grid.square_of(block));
-        self.file
-            .read_exact_at(&mut self.slot, offset)
-            .map_err(|source| ImageError::io("read back", self.path, source))?;
+        let square = self.grid.square_of(block);
+        if self.square != Some(square) {
+            self.square = None;
+            self.file
+                .read_exact_at(&mut self.slot, self.grid.slot_offset(square))
+                .map_err(|source| ImageError::io("read back", self.path, source))?;
+            self.square = Some(square);
+        }
         grid::gather(block, &self.slot, &mut self.payload);
         Ok(payload_digest(&self.payload) == digest)
     }

@@ -73,6 +73,32 @@ fn threads_may_write_at_once() {
 }
 
 #[test]
+fn blocks_that_are_written_together_are_as_if_one_by_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let scratch = Scratch::create_bare(folder.path().join("together"), identity(), CROP).unwrap();
+    let pixels: Vec<Rect> = blocks(CROP, 1, 1);
+    let payloads: Vec<_> = pixels.iter().map(|block| payload(*block)).collect();
+    let mut given: Vec<(Rect, &[u8])> = pixels
+        .iter()
+        .copied()
+        .zip(payloads.iter().map(Vec::as_slice))
+        .collect();
+    // The first to come stays, and what is wrong with one block is that block's alone.
+    let other = vec![0; payloads[0].len()];
+    let nan = f32::NAN.to_le_bytes().repeat(other.len() / 4);
+    given.insert(1, (pixels[0], &other));
+    given.insert(5, (pixels[40], &nan));
+    let verdicts = scratch.write_blocks(&given).unwrap();
+    for (index, verdict) in verdicts.iter().enumerate() {
+        assert_eq!(verdict.is_err(), index == 5, "{index}: {verdict:?}");
+    }
+    assert_eq!(scratch.pixels_done(), CROP.area());
+    scratch.write_again(&given[..1]).unwrap();
+    let expected = finished(folder.path(), CROP).film_digest().unwrap();
+    assert_eq!(scratch.film_digest().unwrap(), expected);
+}
+
+#[test]
 fn an_unfinished_film_has_no_digest() {
     let folder = tempfile::tempdir().unwrap();
     let scratch = Scratch::create(folder.path().join("s"), identity(), CROP).unwrap();

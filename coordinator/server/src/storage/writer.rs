@@ -1,18 +1,19 @@
 //! The thread that makes things durable, in order.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 use std::collections::btree_map::Entry as Place;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender};
 
-use image::{ImageError, Scratch};
+use image::Scratch;
+use model::ImageRef;
 use store::{Entry, Store};
 
 use super::disk::Disk;
 use super::encoder::Encoding;
 use super::{Encoded, Open, Order, Plan, Stored, Ticket, chain};
-use crate::input::{Arrived, News};
+use crate::input::News;
 
 /// Most blocks and records that are made durable together. More would delay the first one's
 /// acknowledgement, and save nothing: a sync's cost is spread thin already.
@@ -31,14 +32,14 @@ pub(super) struct Writer {
 /// What is made durable together.
 #[derive(Default)]
 struct Group {
-    stored: Vec<Stored>,
+    blocks: Vec<(Arc<Plan>, Stored)>,
     records: Vec<Entry>,
     ticket: Option<Ticket>,
 }
 
 impl Group {
     fn len(&self) -> usize {
-        self.stored.len() + self.records.len()
+        self.blocks.len() + self.records.len()
     }
 }
 
@@ -69,14 +70,14 @@ impl Writer {
             let mut next = Some(first);
             while let Some(order) = next.filter(|_| !self.is_over) {
                 match order {
-                    Order::Block(plan, arrived, era) => match self.write(&plan, &arrived) {
-                        Some(result) => group.stored.push(Stored {
+                    Order::Block(plan, arrived, era) => {
+                        let stored = Stored {
                             arrived: *arrived,
                             era,
-                            result,
-                        }),
-                        None => self.is_over = true,
-                    },
+                            result: Ok(()),
+                        };
+                        group.blocks.push((plan, stored));
+                    }
                     Order::Record(entry, ticket) => {
                         group.records.push(entry);
                         group.ticket = ticket.or(group.ticket);
@@ -99,72 +100,78 @@ impl Writer {
         }
     }
 
-    /// Writes a block at its place. An error is the block's, not the disk's.
-    fn write(&mut self, plan: &Plan, arrived: &Arrived) -> Option<Result<(), String>> {
-        let image = arrived.image();
+    /// Writes an image's blocks at their places and syncs them; what is wrong with a block is noted of it. Nothing
+    /// where the disk was given up.
+    fn write(&mut self, image: ImageRef, blocks: &mut [&mut (Arc<Plan>, Stored)]) -> Option<()> {
+        let (plan, _) = blocks.first()?;
         let open = &mut self.open;
-        self.disk.insist(
+        let scratch = self.disk.insist(
             || true,
-            || {
-                let scratch = match open.entry(image) {
-                    Place::Occupied(open) => open.into_mut(),
-                    Place::Vacant(place) => {
-                        let identity = plan.identity_of(image);
-                        let path = plan.scratch_path(image);
-                        plan.folders.make().map_err(|error| chain(&error))?;
-                        let scratch = Scratch::create_bare(path, identity, plan.window);
-                        place.insert(Arc::new(scratch.map_err(|error| chain(&error))?))
-                    }
-                };
-                match scratch.write_block(arrived.block.rect, &arrived.payload) {
-                    Ok(()) => Ok(Ok(())),
-                    Err(
-                        error @ (ImageError::NotFinite { .. }
-                        | ImageError::NotABlock { .. }
-                        | ImageError::PayloadLength { .. }),
-                    ) => Ok(Err(chain(&error))),
-                    Err(error) => Err(chain(&error)),
+            || match open.entry(image) {
+                Place::Occupied(open) => Ok(open.get().clone()),
+                Place::Vacant(place) => {
+                    let identity = plan.identity_of(image);
+                    let path = plan.scratch_path(image);
+                    plan.folders.make().map_err(|error| chain(&error))?;
+                    let scratch = Scratch::create_bare(path, identity, plan.window);
+                    let scratch = Arc::new(scratch.map_err(|error| chain(&error))?);
+                    Ok(place.insert(scratch).clone())
                 }
             },
-        )
+        )?;
+        let payloads: Vec<_> = blocks
+            .iter()
+            .map(|(_, stored)| (stored.arrived.block.rect, &*stored.arrived.payload))
+            .collect();
+        let write = || {
+            scratch
+                .write_blocks(&payloads)
+                .map_err(|error| chain(&error))
+        };
+        let verdicts = self.disk.insist(|| true, write)?;
+        let mut has_failed = false;
+        let sync = || {
+            // After a sync that failed, the next one is silent about what was lost.
+            if std::mem::replace(&mut has_failed, true) {
+                let taken = payloads.iter().zip(&verdicts);
+                let taken = taken.filter_map(|(block, verdict)| verdict.is_ok().then_some(*block));
+                scratch
+                    .write_again(&taken.collect::<Vec<_>>())
+                    .map_err(|error| chain(&error))?;
+            }
+            scratch.sync().map_err(|error| chain(&error))
+        };
+        self.disk.insist(|| true, sync)?;
+        for ((_, stored), verdict) in blocks.iter_mut().zip(verdicts) {
+            stored.result = verdict.map_err(|error| chain(&error));
+        }
+        Some(())
     }
 
     /// Makes a group durable, each scratch file once, then the store, and says so.
     fn settle(&mut self, group: &mut Group) {
         let Group {
-            stored,
+            mut blocks,
             records,
             ticket,
         } = std::mem::take(group);
-        if self.is_over || (stored.is_empty() && records.is_empty()) {
+        if self.is_over || (blocks.is_empty() && records.is_empty()) {
             return;
         }
-        let whole = || stored.iter().filter(|stored| stored.result.is_ok());
-        let images: BTreeSet<_> = whole().map(|stored| stored.arrived.image()).collect();
-        for image in images {
-            let Some(scratch) = self.open.get(&image) else {
-                continue;
-            };
-            let mut has_failed = false;
-            let sync = || {
-                // After a sync that failed, the next one is silent about what was lost.
-                if std::mem::replace(&mut has_failed, true) {
-                    for arrived in whole().map(|stored| &stored.arrived) {
-                        if arrived.image() == image {
-                            scratch
-                                .write_again(arrived.block.rect, &arrived.payload)
-                                .map_err(|error| chain(&error))?;
-                        }
-                    }
-                }
-                scratch.sync().map_err(|error| chain(&error))
-            };
-            if self.disk.insist(|| true, sync).is_none() {
+        let mut images = BTreeMap::<_, Vec<_>>::new();
+        for block in &mut blocks {
+            let image = block.1.arrived.image();
+            images.entry(image).or_default().push(block);
+        }
+        for (image, mut blocks) in images {
+            if self.write(image, &mut blocks).is_none() {
                 self.is_over = true;
                 return;
             }
         }
-        let entries: Vec<_> = whole()
+        let stored: Vec<_> = blocks.into_iter().map(|(_, stored)| stored).collect();
+        let whole = stored.iter().filter(|stored| stored.result.is_ok());
+        let entries: Vec<_> = whole
             .map(|stored| stored.arrived.entry())
             .chain(records)
             .collect();
