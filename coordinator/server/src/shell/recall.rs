@@ -1,9 +1,11 @@
 //! What an earlier start left.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::num::NonZeroUsize;
 use std::sync::Arc;
+use std::thread;
 
-use image::Scratch;
+use image::{ImageError, Scratch};
 use model::{ImageNumber, ImageRef, JobId, Rect, Timestamp};
 use sched::Effect;
 use store::{Entry, Recalled, RecalledBlock, RecalledImage, RecalledJob, Sqlite, Store as _};
@@ -35,30 +37,25 @@ impl Kept {
             if !job.blocks.is_empty() {
                 plan.folders.make()?;
             }
-            let mut blocks: BTreeMap<ImageNumber, Vec<(Rect, model::Digest)>> = BTreeMap::new();
-            for block in &job.blocks {
-                let noted = blocks.entry(block.image).or_default();
-                noted.push((block.rect, block.pixels));
-            }
-            for (number, noted) in blocks {
+            // The store gives them image by image.
+            let images = job.blocks.chunk_by(|a, b| a.image == b.image);
+            let mut gone = BTreeSet::new();
+            for (number, reopened) in reopen_all(&plan, job.job, images.collect()) {
                 let image = ImageRef {
                     job: job.job,
                     image: number,
                 };
-                let path = plan.scratch_path(image);
-                let identity = plan.identity_of(image);
-                let (scratch, lost) = Scratch::reopen_bare(path, identity, plan.window, noted)
-                    .map_err(StartError::Scratch)?;
+                let (scratch, lost) = reopened.map_err(StartError::Scratch)?;
                 open.insert(image, Arc::new(scratch));
                 if !lost.is_empty() {
                     tracing::error!(job = %image.job, image = %number, blocks = lost.len(), "blocks are not on the disk as they were written; they are rendered again");
-                    let gone: BTreeSet<Corners> = lost.iter().map(corners).collect();
-                    let is_there = |block: &RecalledBlock| {
-                        block.image != number || !gone.contains(&corners(&block.rect))
-                    };
-                    job.blocks.retain(is_there);
+                    gone.extend(lost.iter().map(|rect| (number, corners(rect))));
                     store.commit(&[Entry::BlocksLost { image, rects: lost }])?;
                 }
+            }
+            if !gone.is_empty() {
+                job.blocks
+                    .retain(|block| !gone.contains(&(block.image, corners(&block.rect))));
             }
             jobs.insert(job.job, (Arc::new(plan), scene));
         }
@@ -73,6 +70,42 @@ impl Kept {
     pub(crate) fn len(&self) -> usize {
         self.jobs.len()
     }
+}
+
+type Reopened = Result<(Scratch, Vec<Rect>), ImageError>;
+
+/// Opens the scratch files of images of a job and reads back what was noted of them, several at a time: every
+/// byte of them is looked at.
+fn reopen_all(
+    plan: &Plan,
+    job: JobId,
+    images: Vec<&[RecalledBlock]>,
+) -> Vec<(ImageNumber, Reopened)> {
+    let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let reopen = |blocks: &[RecalledBlock]| {
+        let number = blocks.first()?.image;
+        let image = ImageRef { job, image: number };
+        let noted = blocks.iter().map(|block| (block.rect, block.pixels));
+        let path = plan.scratch_path(image);
+        let identity = plan.identity_of(image);
+        let reopened = Scratch::reopen_bare(path, identity, plan.window, noted);
+        Some((number, reopened))
+    };
+    thread::scope(|scope| {
+        let share = images.len().div_ceil(threads).max(1);
+        let parts: Vec<_> = images
+            .chunks(share)
+            .map(|part| {
+                let reopen = &reopen;
+                scope.spawn(move || part.iter().filter_map(|blocks| reopen(blocks)).collect())
+            })
+            .collect();
+        let joined = parts.into_iter().flat_map(|part| {
+            let part: Vec<_> = part.join().expect("opening a file does not panic");
+            part
+        });
+        joined.collect()
+    })
 }
 
 type Corners = [u32; 4];
