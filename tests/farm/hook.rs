@@ -25,10 +25,14 @@ fn it_is_told_of_every_job_that_ends() {
     };
     let cancelled = submit(&farm);
     farm.flyby(["job", "cancel", &cancelled.to_string()]).ok();
+    let removed = submit(&farm);
+    farm.flyby(["job", "remove", &removed.to_string()]).ok();
     farm.worker(&["--threads", "1"]);
     let done = submit(&farm);
     farm.wait_done(done);
-    let expected = format!("{cancelled} short cancelled 0\n{done} short done 1\nshort_0000.exr\n");
+    let expected = format!(
+        "{cancelled} short cancelled 0\n{removed} short cancelled 0\n{done} short done 1\nshort_0000.exr\n"
+    );
     wait::until("the hook has heard of both jobs", || {
         (std::fs::read_to_string(&told).ok()? == expected).then_some(())
     });

@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use std::process::{ExitStatus, Stdio};
 use std::time::Duration;
 
-use tokio::process::Command;
+use rustix::process::{Pid, Signal, kill_process_group};
+use tokio::process::{Child, Command};
 use tokio::sync::mpsc;
 
 /// Jobs whose hook has not been run; of more that end meanwhile it is not.
@@ -30,7 +31,7 @@ impl Hook {
             let (jobs, mut ended) = mpsc::channel::<About>(WAITING_MAX);
             tokio::spawn(async move {
                 while let Some(about) = ended.recv().await {
-                    run(&program, about).await;
+                    run(&program, about, TIME_LIMIT).await;
                 }
             });
             jobs
@@ -46,22 +47,22 @@ impl Hook {
     }
 }
 
-async fn run(program: &Path, about: About) {
+async fn run(program: &Path, about: About, limit: Duration) {
     let shown = program.display();
     let child = Command::new(program)
         .envs(about)
         .stdin(Stdio::null())
         .stdout(Stdio::null())
-        .kill_on_drop(true)
+        .process_group(0)
         .spawn();
     let mut child = match child {
-        Ok(child) => child,
+        Ok(child) => Group(child),
         Err(error) => {
             tracing::error!("cannot run `{shown}` for a job that is over: {error}");
             return;
         }
     };
-    match tokio::time::timeout(TIME_LIMIT, child.wait()).await {
+    match tokio::time::timeout(limit, child.0.wait()).await {
         Ok(Ok(status)) if ExitStatus::success(&status) => {
             tracing::info!("`{shown}` was run for a job that is over");
         }
@@ -71,7 +72,61 @@ async fn run(program: &Path, about: About) {
         Ok(Err(error)) => tracing::error!("`{shown}` cannot be waited for: {error}"),
         Err(_) => tracing::error!(
             "`{shown}`, run for a job that is over, took longer than {} s and is killed",
-            TIME_LIMIT.as_secs()
+            limit.as_secs()
         ),
+    }
+}
+
+/// A program in a group of its own: where it is dropped before it ended, all that it started is killed.
+struct Group(Child);
+
+impl Drop for Group {
+    fn drop(&mut self) {
+        // None once it was waited for: then its number may be another's.
+        let leader = self.0.id().and_then(|id| i32::try_from(id).ok());
+        if let Some(group) = leader.and_then(Pid::from_raw) {
+            let _ = kill_process_group(group, Signal::KILL);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fs;
+    use std::os::unix::fs::PermissionsExt as _;
+
+    use super::*;
+
+    /// Whether a process runs; one that has ended and that nobody waited for does not.
+    fn runs(process: &str) -> bool {
+        let stat = fs::read_to_string(format!("/proc/{process}/stat"));
+        stat.is_ok_and(|stat| !stat.contains(") Z "))
+    }
+
+    #[tokio::test]
+    async fn what_the_program_started_is_killed_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (program, started) = (folder.path().join("hook"), folder.path().join("started"));
+        let script = format!(
+            "#!/bin/sh\nsleep 1000 & echo $! > {0}.new\nmv {0}.new {0}\nwait\n",
+            started.display()
+        );
+        fs::write(&program, script).unwrap();
+        fs::set_permissions(&program, fs::Permissions::from_mode(0o700)).unwrap();
+        let mut running = Box::pin(run(&program, About::new(), Duration::MAX));
+        let child = loop {
+            tokio::select! {
+                () = &mut running => panic!("it ended by itself"),
+                () = tokio::time::sleep(Duration::from_millis(5)) => {}
+            }
+            if let Ok(child) = fs::read_to_string(&started) {
+                break child.trim().to_owned();
+            }
+        };
+        assert!(runs(&child));
+        drop(running);
+        while runs(&child) {
+            tokio::task::yield_now().await;
+        }
     }
 }

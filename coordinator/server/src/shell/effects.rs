@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 
-use model::{ImageRef, JobId, SubmissionId, WorkerId};
+use model::{FrameRange, ImageRef, JobId, SubmissionId, WorkerId};
 use sched::{
     BlockRef, BlockRefusal, Command, Effect, Event, JobOutcome, RevokeReason, WorkerRefusal,
 };
@@ -15,6 +15,7 @@ use wire::proto::{self, ErrorKind, control_down, deliver_down};
 
 use super::{Shell, Submitting};
 use crate::about::JobAbout;
+use crate::hook::About;
 use crate::inbox::NewJob;
 use crate::input::{Frames, Wish};
 use crate::job::{Foretold, Job};
@@ -362,21 +363,14 @@ impl Shell {
             self.say(id, said);
         }
         self.say(id, format!("the job is {words}"));
-        if let (Some(view), Some(job)) = (self.sched.job(id), self.jobs.get(id)) {
-            self.hook.job_ended(|| {
-                vec![
-                    ("FLYBY_JOB", id.to_string()),
-                    ("FLYBY_JOB_NAME", view.name.to_owned()),
-                    ("FLYBY_JOB_STATE", state_word(outcome).to_owned()),
-                    ("FLYBY_JOB_FRAMES", view.frames.to_string()),
-                    ("FLYBY_JOB_FRAMES_DONE", view.images.encoded.to_string()),
-                    ("FLYBY_JOB_FRAMES_FAILED", view.images.failed.to_string()),
-                    (
-                        "FLYBY_JOB_FOLDER",
-                        job.folders().frames.display().to_string(),
-                    ),
-                ]
-            });
+        // Of a job that is removed before it is over the scheduler says nothing any more.
+        let removed = self.commanding.front().map(|waiting| &waiting.before);
+        let summary = self.summary(id);
+        let summary = summary
+            .as_ref()
+            .or(removed.filter(|before| before.job == id.0));
+        if let (Some(summary), Some(job)) = (summary, self.jobs.get(id)) {
+            self.hook.job_ended(|| about_ended(summary, outcome, job));
         }
         if let Some(job) = self.jobs.get_mut(id) {
             // No event of its own told of images that were never begun.
@@ -586,6 +580,24 @@ fn command_words(command: Command) -> Option<String> {
         ),
         Command::Cancel | Command::Remove => return None,
     })
+}
+
+/// What the operator's program is told of a job that is over.
+fn about_ended(summary: &proto::JobSummary, outcome: JobOutcome, job: &Job) -> About {
+    let frames = summary.frames.map(FrameRange::try_from);
+    let frames = frames.and_then(Result::ok).map(|frames| frames.to_string());
+    vec![
+        ("FLYBY_JOB", summary.job.to_string()),
+        ("FLYBY_JOB_NAME", summary.name.clone()),
+        ("FLYBY_JOB_STATE", state_word(outcome).to_owned()),
+        ("FLYBY_JOB_FRAMES", frames.unwrap_or_default()),
+        ("FLYBY_JOB_FRAMES_DONE", summary.images_done.to_string()),
+        ("FLYBY_JOB_FRAMES_FAILED", summary.images_failed.to_string()),
+        (
+            "FLYBY_JOB_FOLDER",
+            job.folders().frames.display().to_string(),
+        ),
+    ]
 }
 
 fn revoke_words(reason: RevokeReason) -> &'static str {
