@@ -79,6 +79,26 @@ pub(crate) const PRESETS: &[Preset] = &[
         about: "wavelet noise, thesis eq. (4.23) (fig. 4.21)",
     },
     Preset {
+        name: "gradient-2d",
+        expression: Some("gradient_noise(p, #{dimensions: 2, key: key})"),
+        about: "gradient noise of the plane, where the others are slices of noises of space",
+    },
+    Preset {
+        name: "value-2d",
+        expression: Some("value_noise(p, #{dimensions: 2, key: key})"),
+        about: "value noise of the plane",
+    },
+    Preset {
+        name: "sparse-2d",
+        expression: Some("sparse(p, #{dimensions: 2, nodes: 1, key: key})"),
+        about: "sparse convolution of the plane (its picture: fig. 4.10a)",
+    },
+    Preset {
+        name: "cellular-2d",
+        expression: Some("cellular(p, #{dimensions: 2, key: key})"),
+        about: "the distance to the nearest node of the plane (its picture: fig. 4.15a)",
+    },
+    Preset {
         name: "white",
         expression: None,
         about: "independent Gaussian numbers of unit power density: the reference, 0 dB everywhere",
