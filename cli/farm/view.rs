@@ -58,6 +58,8 @@ pub(crate) struct Job {
     pub(crate) blocks_twice: u64,
     /// Blocks of which two renderings differed.
     pub(crate) incidents: u64,
+    /// Tiles that were to be rendered once more and compared, and were not.
+    pub(crate) unverified: u64,
     /// Tiles of each frame; 0 where they are cut by time.
     pub(crate) tiles_per_image: u32,
     /// Their size, such as `64x64`.
@@ -284,6 +286,7 @@ impl From<proto::JobSummary> for Job {
                 .map(|part| format!("{},{},{},{}", part.x0, part.y0, part.x1, part.y1)),
             blocks_twice: job.blocks_twice,
             incidents: job.incidents,
+            unverified: job.unverified,
             images_total: job.images,
             images_done: job.images_done,
             images_failed: job.images_failed,
@@ -501,6 +504,13 @@ impl Report for Job {
                 out,
                 "  WRONG   {} blocks were rendered twice with different pixels: `flyby job log {}` names the workers",
                 self.incidents, self.job
+            )?;
+        }
+        if self.unverified > 0 {
+            writeln!(
+                out,
+                "  {} tiles were to be verified and were not: no other worker could render them in time",
+                self.unverified
             )?;
         }
         self.rank(out)?;

@@ -8,6 +8,7 @@ use model::{AttemptId, ImageRef, WorkerId};
 
 use crate::attempt::{Attempt, Phase};
 use crate::timers::Timer;
+use crate::work::Reopened;
 use crate::{Effect, Link, RevokeReason, Sched};
 
 impl Sched {
@@ -89,8 +90,9 @@ impl Sched {
             [attempts.next(), attempts.next()]
         };
         let mut only = None;
+        let mut reopened = Reopened::Plain;
         match live {
-            [None, _] => work.reopen(number),
+            [None, _] => reopened = work.reopen(number, self.now),
             [Some(one), None] => {
                 let away = self.workers[self.attempts[one].worker].link == Link::Closed;
                 work.share(number, away);
@@ -110,6 +112,9 @@ impl Sched {
                 }
                 state.enlisted = key;
             }
+        }
+        if reopened == Reopened::Checks {
+            self.check_waits(image);
         }
         self.job_changed(image.job);
     }

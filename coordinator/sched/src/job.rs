@@ -9,12 +9,13 @@ use alloc::vec::Vec;
 use model::{ImageNumber, ImageRef, JobId, Rect, Span, Timestamp, WorkerId};
 
 use crate::costs::Costs;
-use crate::market::{Rank, Stage};
+use crate::market::{Rank, Stands};
 use crate::needs::Kind;
 use crate::pace::time_of;
 use crate::places::Places;
 use crate::spread::Spread;
 use crate::tiling::TileGrid;
+use crate::timers::Alarm;
 use crate::view::Paused;
 use crate::work::{Amount, Ask, Work};
 use crate::{
@@ -52,10 +53,14 @@ pub(crate) struct Job {
     pub(crate) spread: Spread,
     /// Attempts that are their tile's only one, by when they are expected to be done.
     pub(crate) ending: BTreeSet<(Timestamp, u64)>,
-    /// Workers that are set aside for it.
+    /// Workers that are set aside for it…
     pub(crate) aside: u32,
+    /// …and those of them that would take its tiles if they were not.
+    pub(crate) aside_able: u32,
+    /// When the first of its checks that wait has waited for too long, or earlier.
+    pub(crate) unverified: Alarm,
     /// Where it stands in the market.
-    pub(crate) seat: Option<(Stage, Rank)>,
+    pub(crate) stands: Stands,
 }
 
 /// How the images of a job are cut.
@@ -76,6 +81,7 @@ pub(crate) struct Tally {
     pub(crate) pixels_again: u64,
     pub(crate) blocks_twice: u64,
     pub(crate) incidents: u64,
+    pub(crate) unverified: u64,
     pub(crate) seconds: u64,
     pub(crate) called_back: u64,
     pub(crate) render_time: Span,
@@ -123,7 +129,9 @@ impl Job {
             spread: Spread::default(),
             ending: BTreeSet::new(),
             aside: 0,
-            seat: None,
+            aside_able: 0,
+            unverified: Alarm::default(),
+            stands: Stands::default(),
             spec,
         }
     }
@@ -182,23 +190,28 @@ impl Job {
     }
 
     /// Where it belongs in the market.
-    pub(crate) fn stands(&self, config: &Config) -> Option<(Stage, Rank)> {
-        let stage = if !self.goes_on() {
-            None
-        } else if self.has_tiles(config) {
-            Some(Stage::Open)
-        } else if !self.ending.is_empty() {
-            Some(Stage::Ending)
-        } else {
-            None
-        };
+    pub(crate) fn belongs(&self, config: &Config) -> Stands {
+        if !self.goes_on() {
+            return Stands::default();
+        }
         let rank = Rank::new(self.priority, self.tally.attempts_live, self.share, self.id);
-        Some((stage?, rank))
+        let is_open = self.has_tiles(config);
+        // While pixels are missing that nobody renders, whoever has nothing to do does those.
+        let is_ending = !self.ending.is_empty() && !self.has_missing(config);
+        Stands {
+            open: is_open.then_some(rank),
+            ending: is_ending.then_some(rank),
+        }
     }
 
     /// Whether some worker could be given a tile.
     pub(crate) fn has_tiles(&self, config: &Config) -> bool {
         self.may_begin(config) || self.work.values().any(Work::has_open)
+    }
+
+    /// Whether pixels that are not durable wait for a worker.
+    fn has_missing(&self, config: &Config) -> bool {
+        self.may_begin(config) || self.work.values().any(Work::has_missing)
     }
 
     /// Whether this worker could be.
@@ -380,6 +393,7 @@ impl Job {
             pixels_again: tally.pixels_again,
             blocks_twice: tally.blocks_twice,
             incidents: tally.incidents,
+            unverified: tally.unverified,
             seconds: tally.seconds,
             called_back: tally.called_back,
             render_time: tally.render_time,

@@ -115,11 +115,16 @@ impl Sched {
             .map(|aim| self.tile_by_time(job, (aim, left), speed));
         Some(Ask {
             worker: worker.id,
-            able: self.kinds.able(job.kind).saturating_sub(job.aside),
+            able: self.able_for(job),
             most,
             fits,
             lasts: left.map(|left| cost_of(left + self.config.tile_time, speed)),
         })
+    }
+
+    /// Workers that take tiles of a job.
+    pub(crate) fn able_for(&self, job: &Job) -> u32 {
+        self.kinds.able(job.kind) - job.aside_able
     }
 
     /// The speed of all threads of workers that take tiles.
@@ -152,9 +157,6 @@ impl Sched {
         if let Some((place, tile)) = tile {
             let image = job.image_ref(place);
             self.lease_tile(worker, (image, tile), Purpose::First, out);
-        }
-        if self.config.verify > 0 {
-            self.finish_what_is_not_checked(job_id, out);
         }
         self.job_changed(job_id);
         self.settle_job(job_id);
@@ -198,7 +200,7 @@ impl Sched {
             .tiles
             .get(number)
             .expect("a tile that is leased is there");
-        let mut wanted = work.wanted(tile);
+        let mut wanted = work.wanted(tile, worker.id);
         let rect = tile.rect;
         let cost = match wanted.is_empty() {
             true => job.costs.of_blocks(rect.blocks()),

@@ -27,11 +27,11 @@ pub(crate) struct Market {
 }
 
 /// Workers that are alike: where one of them finds no job, the others need not look.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct Group {
     pub(crate) kinds: KindSet,
-    /// A job that they are set aside for.
-    pub(crate) aside: Option<JobId>,
+    /// The jobs that they are set aside for, in order.
+    pub(crate) aside: Vec<JobId>,
     /// Whether their time is limited.
     pub(crate) is_limited: bool,
 }
@@ -64,6 +64,13 @@ pub(crate) enum Stage {
     Open,
     /// Tiles that are leased, and could be leased a second time or called back.
     Ending,
+}
+
+/// Where a job stands: it may have both, tiles that suit nobody who is free and others that could be helped.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Stands {
+    pub(crate) open: Option<Rank>,
+    pub(crate) ending: Option<Rank>,
 }
 
 impl Seat {
@@ -107,16 +114,16 @@ impl Market {
         if *slot == seat {
             return;
         }
-        if let Some((group, old)) = *slot
-            && let Some(seats) = self.wanting.get_mut(&group)
+        if let Some((group, old)) = slot
+            && let Some(seats) = self.wanting.get_mut(group)
         {
-            seats.remove(&old);
+            seats.remove(old);
             if seats.is_empty() {
-                self.wanting.remove(&group);
+                self.wanting.remove(group);
             }
         }
-        if let Some((group, new)) = seat {
-            self.wanting.entry(group).or_default().insert(new);
+        if let Some((group, new)) = &seat {
+            self.wanting.entry(group.clone()).or_default().insert(*new);
             self.touched.add(group.kinds);
             self.came = true;
         }
@@ -124,22 +131,24 @@ impl Market {
     }
 
     /// Puts a job where it now belongs; `slot` is where it stood.
-    pub(crate) fn place_job(
-        &mut self,
-        kind: Kind,
-        slot: &mut Option<(Stage, Rank)>,
-        place: Option<(Stage, Rank)>,
-    ) {
-        if *slot == place {
-            return;
+    pub(crate) fn place_job(&mut self, kind: Kind, slot: &mut Stands, stands: Stands) {
+        let moves = [
+            (Stage::Open, slot.open, stands.open),
+            (Stage::Ending, slot.ending, stands.ending),
+        ];
+        for (stage, before, after) in moves
+            .into_iter()
+            .filter(|(_, before, after)| before != after)
+        {
+            let ranks = self.ranks(stage, kind);
+            if let Some(rank) = before {
+                ranks.remove(&rank);
+            }
+            if let Some(rank) = after {
+                ranks.insert(rank);
+            }
         }
-        if let Some((stage, rank)) = *slot {
-            self.ranks(stage, kind).remove(&rank);
-        }
-        if let Some((stage, rank)) = place {
-            self.ranks(stage, kind).insert(rank);
-        }
-        *slot = place;
+        *slot = stands;
     }
 
     /// Whether a worker came or moved since this was last asked.

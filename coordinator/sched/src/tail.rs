@@ -158,7 +158,7 @@ impl Sched {
         let missing: Vec<Rect> = tile.rect.blocks().filter(is_missing).collect();
         let blocks = missing.len() as u64;
         let cost = job.costs.of_blocks(missing.into_iter())?;
-        let able = self.kinds.able(job.kind).saturating_sub(job.aside);
+        let able = self.able_for(job);
         let suits = tile.trouble.suits(self.workers[place].id, able);
         Some((cost, blocks, suits))
     }

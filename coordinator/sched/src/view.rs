@@ -59,6 +59,8 @@ pub struct JobView<'a> {
     pub blocks_twice: u64,
     /// Blocks of which two renderings differed.
     pub incidents: u64,
+    /// Tiles that were to be rendered once more, and were not, since nobody could.
+    pub unverified: u64,
     /// Tiles that were leased a second time on purpose.
     pub seconds: u64,
     /// Leases that were called back before they were started.

@@ -107,6 +107,13 @@ impl Shell {
                 worker,
                 other,
             } => self.incident(block, worker, other),
+            Effect::Unverified { image, tiles } => {
+                tracing::warn!(job = %image.job, image = %image.image, tiles, "tiles were not verified");
+                self.say(
+                    image.job,
+                    format!("frame {}: {tiles} tiles were not verified, since no other worker could render them in time", image.image),
+                );
+            }
             Effect::Commanded { job } => self.commanded(job, None),
             Effect::CommandRefused { job, refusal } => self.commanded(job, Some(refusal)),
             Effect::RenderAgain { image, worker } => {

@@ -86,6 +86,7 @@ pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
         focus: view.focus.map(Into::into),
         blocks_twice: view.blocks_twice,
         incidents: view.incidents,
+        unverified: view.unverified,
         left: None,
     }
 }
