@@ -59,8 +59,12 @@ impl Aside {
     }
 
     /// The jobs of which it gets no tile, in order.
-    pub(crate) fn jobs(&self) -> impl Iterator<Item = JobId> {
-        self.jobs.keys().copied()
+    pub(crate) fn jobs(&self) -> Vec<JobId> {
+        // Mostly there are none, and this is asked at every event.
+        match self.jobs.is_empty() {
+            true => Vec::new(),
+            false => self.jobs.keys().copied().collect(),
+        }
     }
 
     fn fails(&mut self, job: JobId, now: Timestamp, config: &Config) -> Verdict {

@@ -6,14 +6,15 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, ImageRef, WorkerId};
 
-use crate::attempt::{Attempt, Phase};
+use crate::attempt::Phase;
+use crate::roster::Place;
 use crate::timers::Timer;
 use crate::work::Reopened;
 use crate::{Effect, Link, RevokeReason, Sched};
 
 impl Sched {
-    /// Removes a live attempt; its tile waits for another where nobody who can be reached renders it.
-    pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Attempt> {
+    /// Removes a live attempt; its tile waits for another where nobody who can be reached renders it. Says whose it was.
+    pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Place> {
         let mut attempt = self.attempts.remove(number)?;
         self.timers.remove(Timer::Stuck(number), &mut attempt.stuck);
         if let Some(name) = attempt.name {
@@ -39,7 +40,7 @@ impl Sched {
             }
         }
         self.reconsider(attempt.image, attempt.tile);
-        Some(attempt)
+        Some(attempt.worker)
     }
 
     /// Ends a live attempt and tells its worker.
@@ -48,8 +49,8 @@ impl Sched {
         if matches!(reason, RevokeReason::CalledBack | RevokeReason::Paused) {
             self.ends_on_purpose(number);
         }
-        if let Some(ended) = self.end_attempt(number) {
-            let worker = self.workers[ended.worker].id;
+        if let Some(place) = self.end_attempt(number) {
+            let worker = self.workers[place].id;
             out.push(Effect::Revoke {
                 worker,
                 attempt,

@@ -1,5 +1,6 @@
 //! Blocks: what is durable counts, once.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use model::{Digest, ImageRef, Span, WorkerId};
@@ -75,8 +76,9 @@ impl Sched {
             return;
         };
         let new = work.pixels.add(rect);
-        if new > 0 {
-            work.made_by(worker);
+        // Nobody is found to lie where nothing is verified.
+        if new > 0 && self.config.verify > 0 {
+            work.makers.insert(worker);
         }
         let tile = work.tile_of(rect);
         let mut tile_done = false;
@@ -234,7 +236,7 @@ impl Sched {
         // Only while two are at work on it can there be another one to compare it with, or later.
         let is_compared = tile.live_count() > 1 || is_drawn(verify, image, tile.region);
         if is_compared && durable == Durable::ByThis {
-            tile.evidence.first.push(made);
+            tile.evidence.add_first(made);
         }
         false
     }
@@ -254,10 +256,11 @@ impl Sched {
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
         let is_drawn = is_drawn(verify, image, done.region)
-            && done.evidence.first.len() == done.rect.blocks().count();
-        let is_doubted = verify > 0 && !done.evidence.dissent.is_empty();
+            && done.evidence.firsts().len() == done.rect.blocks().count();
+        let is_doubted = verify > 0 && !done.evidence.dissents().is_empty();
         if is_drawn || is_doubted {
-            done.check = Some(Check::of(core::mem::take(&mut done.evidence)));
+            let evidence = core::mem::take(&mut done.evidence);
+            done.check = Some(Box::new(Check::of(evidence)));
         }
         let live: [Option<u64>; 2] = {
             let mut attempts = done.attempts();

@@ -1,5 +1,6 @@
 //! What a tile's blocks are held against when somebody renders them once more.
 
+use alloc::boxed::Box;
 use alloc::collections::VecDeque;
 use alloc::vec::Vec;
 
@@ -16,46 +17,74 @@ pub(crate) struct Made {
 }
 
 /// What was made of some blocks; it stays with their pixels however those are cut.
+///
+/// Of most tiles nothing is kept, so that this is small where it is empty.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub(crate) struct Evidence {
+pub(crate) struct Evidence(Option<Box<Known>>);
+
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+struct Known {
     /// As they are durable, where that may be compared with another rendering of them.
-    pub(crate) first: Vec<Made>,
+    first: Vec<Made>,
     /// What others made of some of those that differed.
-    pub(crate) dissent: Vec<Made>,
+    dissent: Vec<Made>,
 }
 
 impl Evidence {
-    /// Takes out what is known of the blocks inside of some pixels.
-    pub(crate) fn take(&mut self, rect: Rect) -> Self {
-        let take = |made: &mut Vec<Made>| {
-            if made.is_empty() {
-                return Vec::new();
-            }
-            let (inside, outside) = made.iter().partition(|made| rect.contains(made.rect));
-            *made = outside;
-            inside
-        };
-        Self {
-            first: take(&mut self.first),
-            dissent: take(&mut self.dissent),
-        }
+    /// Blocks as they are durable, where that is known.
+    pub(crate) fn firsts(&self) -> &[Made] {
+        self.0.as_ref().map_or(&[], |known| &known.first)
     }
 
-    pub(crate) fn add(&mut self, other: Self) {
-        self.first.extend(other.first);
-        self.dissent.extend(other.dissent);
+    /// What others made otherwise.
+    pub(crate) fn dissents(&self) -> &[Made] {
+        self.0.as_ref().map_or(&[], |known| &known.dissent)
     }
 
     /// A block as it is durable.
     pub(crate) fn first(&self, rect: Rect) -> Option<Made> {
-        let first = self.first.iter().find(|made| made.rect == rect);
+        let first = self.firsts().iter().find(|made| made.rect == rect);
         first.copied()
+    }
+
+    pub(crate) fn add_first(&mut self, made: Made) {
+        self.0.get_or_insert_default().first.push(made);
+    }
+
+    pub(crate) fn add_dissent(&mut self, made: Made) {
+        self.0.get_or_insert_default().dissent.push(made);
+    }
+
+    pub(crate) fn add(&mut self, other: Self) {
+        if let Some(other) = other.0 {
+            let known = self.0.get_or_insert_default();
+            known.first.extend(other.first);
+            known.dissent.extend(other.dissent);
+        }
+    }
+
+    /// Takes out what is known of the blocks inside of some pixels.
+    pub(crate) fn take(&mut self, rect: Rect) -> Self {
+        let take = |made: &mut Vec<Made>| {
+            let (inside, outside) = made.iter().partition(|made| rect.contains(made.rect));
+            *made = outside;
+            inside
+        };
+        let taken = self.0.as_mut().map(|known| {
+            Box::new(Known {
+                first: take(&mut known.first),
+                dissent: take(&mut known.dissent),
+            })
+        });
+        Self(taken)
     }
 
     /// Nothing more is to be known of a block.
     fn settle(&mut self, rect: Rect) {
-        self.first.retain(|made| made.rect != rect);
-        self.dissent.retain(|made| made.rect != rect);
+        if let Some(known) = &mut self.0 {
+            known.first.retain(|made| made.rect != rect);
+            known.dissent.retain(|made| made.rect != rect);
+        }
     }
 }
 
@@ -107,7 +136,7 @@ impl Check {
 
     /// The blocks that a worker rendered none of.
     fn blocks_for(&self, worker: WorkerId) -> impl Iterator<Item = Rect> {
-        let Evidence { first, dissent } = &self.evidence;
+        let (first, dissent) = (self.evidence.firsts(), self.evidence.dissents());
         // A process that was started again is the same machine.
         let is_own = move |made: &Made| made.by.id == worker.id;
         let of_others = first.iter().filter(move |made| !is_own(made));
@@ -117,7 +146,11 @@ impl Check {
 
     /// All that rendered some of it.
     pub(crate) fn makers(&self) -> Vec<WorkerId> {
-        let made = self.evidence.first.iter().chain(&self.evidence.dissent);
+        let made = self
+            .evidence
+            .firsts()
+            .iter()
+            .chain(self.evidence.dissents());
         let mut makers: Vec<WorkerId> = made.map(|made| made.by).collect();
         makers.sort_unstable();
         makers.dedup();
@@ -126,7 +159,7 @@ impl Check {
 
     /// Those who made something that another made otherwise.
     pub(crate) fn doubted(&self) -> Vec<WorkerId> {
-        let dissent = &self.evidence.dissent;
+        let dissent = self.evidence.dissents();
         let first = dissent
             .iter()
             .filter_map(|made| self.evidence.first(made.rect));
@@ -138,12 +171,12 @@ impl Check {
 
     /// Whether all of it was found to be right.
     pub(crate) fn is_done(&self) -> bool {
-        self.evidence.first.is_empty()
+        self.evidence.firsts().is_empty()
     }
 
     /// The blocks that are to be rendered, by whoever that may be.
     pub(crate) fn blocks(&self) -> impl Iterator<Item = Rect> {
-        self.evidence.first.iter().map(|made| made.rect)
+        self.evidence.firsts().iter().map(|made| made.rect)
     }
 
     /// The blocks that a worker is to render, in order.
@@ -183,7 +216,7 @@ impl Check {
         let Some(first) = self.evidence.first(made.rect).filter(|_| is_asked_for) else {
             return Finding::Nothing;
         };
-        let dissent = &self.evidence.dissent;
+        let dissent = self.evidence.dissents();
         let dissent = dissent.iter().find(|dissent| dissent.rect == made.rect);
         let finding = match (made.pixels == first.pixels, dissent) {
             (true, None) => Finding::Nothing,
@@ -200,7 +233,7 @@ impl Check {
         };
         match finding {
             Finding::Nothing | Finding::DissenterWrong { .. } => self.evidence.settle(made.rect),
-            Finding::Doubt { .. } => self.evidence.dissent.push(made),
+            Finding::Doubt { .. } => self.evidence.add_dissent(made),
             Finding::FirstWrong { .. } | Finding::Everybody => {}
         }
         finding

@@ -165,7 +165,7 @@ impl Sched {
             assert_eq!(worker.counted, worker.counts());
             capacity += worker.counted.as_ref().map_or(0, |counts| counts.capacity);
             assert!(worker.lost.due().is_some());
-            let is_aside = worker.aside.farm().is_some() || worker.aside.jobs().next().is_some();
+            let is_aside = worker.aside.farm().is_some() || !worker.aside.jobs().is_empty();
             assert_eq!(worker.aside.alarm.due().is_some(), is_aside);
             timers += self.timers.check(Timer::Lost(place), worker.lost);
             timers += self.timers.check(Timer::Waiting(place), worker.waiting);
@@ -221,7 +221,7 @@ impl Sched {
                 let is_limited = worker.ends.is_some();
                 let wants = worker.seat.is_some() && worker.kinds.contains(job.kind) && !is_limited;
                 assert!(
-                    !wants || !self.may_take(place, *id),
+                    !wants || self.may_take(place, *id).is_none(),
                     "what can be leased is"
                 );
             }

@@ -1,5 +1,6 @@
 //! A job: its images in order, those in flight, and what was counted.
 
+use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -47,8 +48,10 @@ pub(crate) struct Job {
     encoding: BTreeSet<u32>,
     pub(crate) failures: Vec<ImageFailure>,
     pub(crate) tally: Tally,
-    /// Who rendered the latest images that are rendered.
-    pub(crate) makers: BTreeMap<u32, Vec<WorkerId>>,
+    /// Who rendered the latest images that are rendered, where that may matter.
+    pub(crate) makers: BTreeMap<u32, Box<[WorkerId]>>,
+    /// Of all those images together.
+    pub(crate) makers_count: usize,
     pub(crate) costs: Costs,
     pub(crate) spread: Spread,
     /// Attempts that are their tile's only one, by when they are expected to be done.
@@ -125,6 +128,7 @@ impl Job {
                 ..Tally::default()
             },
             makers: BTreeMap::new(),
+            makers_count: 0,
             costs: Costs::unknown(spec.window),
             spread: Spread::default(),
             ending: BTreeSet::new(),
@@ -307,7 +311,7 @@ impl Job {
         }
         let image = self.image_ref(place).image;
         self.failures.retain(|failure| failure.image != image);
-        self.makers.remove(&place);
+        self.forget_makers(place);
         self.set_state(place, ImageState::Waiting);
     }
 

@@ -11,6 +11,9 @@ use model::{JobId, Timestamp};
 use crate::needs::{Kind, KindSet};
 use crate::roster::Place;
 
+/// Groups of workers beyond which those that are empty are forgotten.
+const GROUPS_KEPT: usize = 32;
+
 /// Workers that want tiles and jobs that have some, by the kind of job.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Market {
@@ -118,16 +121,24 @@ impl Market {
             && let Some(seats) = self.wanting.get_mut(group)
         {
             seats.remove(old);
-            if seats.is_empty() {
-                self.wanting.remove(group);
-            }
         }
         if let Some((group, new)) = &seat {
-            self.wanting.entry(group.clone()).or_default().insert(*new);
+            match self.wanting.get_mut(group) {
+                Some(seats) => drop(seats.insert(*new)),
+                None => self.found(group.clone(), *new),
+            }
             self.touched.add(group.kinds);
             self.came = true;
         }
         *slot = seat;
+    }
+
+    /// A group gets its first worker. Groups that are empty are kept, since most are not for long, but not many.
+    fn found(&mut self, group: Group, seat: Seat) {
+        if self.wanting.len() >= GROUPS_KEPT {
+            self.wanting.retain(|_, seats| !seats.is_empty());
+        }
+        self.wanting.insert(group, BTreeSet::from([seat]));
     }
 
     /// Puts a job where it now belongs; `slot` is where it stood.

@@ -1,5 +1,6 @@
 //! A tile: a part of an image that is leased, and what is known against it.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use model::{Rect, WorkerId};
@@ -22,7 +23,7 @@ pub(crate) struct Tile {
     /// What was made of its blocks.
     pub(crate) evidence: Evidence,
     /// Where it is rendered once more: what it is held against.
-    pub(crate) check: Option<Check>,
+    pub(crate) check: Option<Box<Check>>,
 }
 
 /// What went wrong with some pixels; it stays with them however they are cut.
@@ -63,7 +64,7 @@ impl Tile {
             ..Trouble::default()
         };
         Self {
-            check: Some(check),
+            check: Some(Box::new(check)),
             ..Self::new((region, rect), 0, (trouble, Evidence::default()))
         }
     }

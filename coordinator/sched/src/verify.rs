@@ -9,6 +9,7 @@
 //! or have too little time left. Time in which its job is held up does not count. Like any lease it is cut down to what fits
 //! into the time that a worker has left, and what was found right is not rendered a third time.
 
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
 use model::{ImageRef, JobId, Timestamp, WorkerId};
@@ -25,8 +26,8 @@ use crate::{BlockRef, Effect, RevokeReason, Sched};
 /// Tiles of which [`crate::Config::verify`] are rendered once more.
 const OF: u64 = 1_000_000;
 
-/// Rendered images of a job whose makers are remembered; those that come first are forgotten.
-const MAKERS_REMEMBERED: usize = 4_096;
+/// Makers of rendered images of one job that are remembered, of all images together; those of the first are forgotten.
+const MAKERS_REMEMBERED: usize = 1 << 16;
 
 /// Whether a tile is one of those that are rendered once more.
 pub(crate) fn is_drawn(share: u32, image: ImageRef, region: Region) -> bool {
@@ -69,7 +70,7 @@ impl Sched {
         let is_last = self.attempts[number].is_delivered();
         let Some(check) = self
             .checked_tile(number)
-            .and_then(|tile| tile.check.as_mut())
+            .and_then(|tile| tile.check.as_deref_mut())
         else {
             return;
         };
@@ -113,12 +114,14 @@ impl Sched {
     /// A worker has delivered all that it was to render once more.
     fn check_ends(&mut self, number: u64, by: WorkerId, out: &mut Vec<Effect>) {
         let tile = self.checked_tile(number);
-        let check = tile.and_then(|tile| tile.check.as_ref());
+        let check = tile.and_then(|tile| tile.check.as_deref());
         match check.is_some_and(|check| check.suits(by)) {
             // What it delivered was something else.
             true => self.check_fails(number, by, out),
             // What of it is its own work waits for somebody else.
-            false => drop(self.end_attempt(number)),
+            false => {
+                self.end_attempt(number);
+            }
         }
     }
 
@@ -140,7 +143,7 @@ impl Sched {
             && let Some(mut check) = tile.check.take()
         {
             match check.fails(by) >= max {
-                true => given_up = Some(check),
+                true => given_up = Some(*check),
                 false => tile.check = Some(check),
             }
         }
@@ -181,7 +184,7 @@ impl Sched {
         let mut first = made.by;
         if let Some(tile) = self.checked_tile(number) {
             first = tile.evidence.first(made.rect).map_or(first, |made| made.by);
-            tile.evidence.dissent.push(made);
+            tile.evidence.add_dissent(made);
         }
         self.report_incident(block, made.by, first, out);
         self.revoke(number, RevokeReason::Differs, out);
@@ -379,20 +382,31 @@ impl Job {
     }
 
     /// Remembers who rendered an image.
-    pub(crate) fn remember_makers(&mut self, place: u32, makers: Vec<WorkerId>) {
-        self.makers.insert(place, makers);
-        if self.makers.len() > MAKERS_REMEMBERED {
-            self.makers.pop_first();
+    pub(crate) fn remember_makers(&mut self, place: u32, makers: BTreeSet<WorkerId>) {
+        self.forget_makers(place);
+        self.makers_count += makers.len();
+        if !makers.is_empty() {
+            self.makers.insert(place, makers.into_iter().collect());
         }
+        while self.makers_count > MAKERS_REMEMBERED
+            && let Some((_, forgotten)) = self.makers.pop_first()
+        {
+            self.makers_count -= forgotten.len();
+        }
+    }
+
+    /// Forgets who rendered an image.
+    pub(crate) fn forget_makers(&mut self, place: u32) {
+        let forgotten = self.makers.remove(&place);
+        self.makers_count -= forgotten.map_or(0, |makers| makers.len());
     }
 
     /// The places of images that a worker had a part in, as far as that is remembered.
     fn images_made_by(&self, worker: WorkerId) -> impl Iterator<Item = u32> {
-        let has_part = move |makers: &[WorkerId]| makers.contains(&worker);
         let in_flight = self.work.iter();
-        let in_flight = in_flight.filter(move |(_, work): &(_, &Work)| has_part(&work.makers));
+        let in_flight = in_flight.filter(move |(_, work)| work.makers.contains(&worker));
         let rendered = self.makers.iter();
-        let rendered = rendered.filter(move |(_, makers)| has_part(makers));
+        let rendered = rendered.filter(move |(_, makers)| makers.contains(&worker));
         let wanted = self.outcome != Some(crate::JobOutcome::Cancelled);
         let places = in_flight.map(|(&place, _)| place);
         let places = places.chain(rendered.map(|(&place, _)| place));

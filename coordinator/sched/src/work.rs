@@ -47,8 +47,8 @@ pub(crate) struct Work {
     pub(crate) checks: Checks,
     /// Checks that were given up.
     pub(crate) unverified: u32,
-    /// Who rendered some of it.
-    pub(crate) makers: Vec<WorkerId>,
+    /// Who rendered some of it, where that may matter.
+    pub(crate) makers: BTreeSet<WorkerId>,
     /// Tiles that are open to a second attempt, because the worker of the first is away.
     shared: BTreeSet<u32>,
     /// Of all pieces.
@@ -113,7 +113,7 @@ impl Work {
             troubled: VecDeque::new(),
             checks: Checks::new(),
             unverified: 0,
-            makers: Vec::new(),
+            makers: BTreeSet::new(),
             shared: BTreeSet::new(),
             open: Amount::default(),
         };
@@ -475,7 +475,7 @@ impl Work {
         } else if let Some(check) = tile.check.filter(|check| !check.is_done()) {
             self.checks.push_back(Waiting {
                 region,
-                check,
+                check: *check,
                 since: now,
             });
             return Reopened::Checks;
@@ -520,13 +520,6 @@ impl Work {
     /// Whether every pixel is durable, and nothing is to be rendered once more.
     pub(crate) fn is_finished(&self) -> bool {
         self.pixels.is_complete() && self.checks.is_empty() && self.tiles.is_empty()
-    }
-
-    /// Notes who rendered some of it.
-    pub(crate) fn made_by(&mut self, worker: WorkerId) {
-        if !self.makers.contains(&worker) {
-            self.makers.push(worker);
-        }
     }
 
     /// The tile that a block is part of, if one is.

@@ -106,7 +106,7 @@ impl Worker {
     pub(crate) fn counts(&self) -> Option<Counts> {
         self.is_able().then(|| Counts {
             kinds: self.kinds,
-            aside: self.aside.jobs().collect(),
+            aside: self.aside.jobs(),
             capacity: u64::from(self.offer.threads) * u64::from(self.pace.speed()),
         })
     }
@@ -123,7 +123,7 @@ impl Worker {
             );
             let group = Group {
                 kinds: self.kinds,
-                aside: self.aside.jobs().collect(),
+                aside: self.aside.jobs(),
                 is_limited: self.ends.is_some(),
             };
             (group, seat)
