@@ -22,8 +22,7 @@ const UNMAPPED_FACTOR: u64 = 4;
 /// but those that failed at it, which are fewer than this before its image fails.
 const SEATS_LOOKED_AT: usize = 8;
 
-/// Most workers that are helped out with somebody else's work at one event. What is called back may go to
-/// another worker than the one it was called back for, and be worth calling back again.
+/// Most workers that are helped out with somebody else's work at one event.
 const HELPS_MAX: usize = 64;
 
 /// Why a tile is leased.
@@ -150,7 +149,13 @@ impl Sched {
     }
 
     /// Leases a worker the next tile of a job, if there still is one.
-    fn lease(&mut self, worker: Place, job_id: JobId, ask: &Ask, out: &mut Vec<Effect>) -> bool {
+    pub(crate) fn lease(
+        &mut self,
+        worker: Place,
+        job_id: JobId,
+        ask: &Ask,
+        out: &mut Vec<Effect>,
+    ) -> bool {
         let job = self
             .jobs
             .get_mut(&job_id)

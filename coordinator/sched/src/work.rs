@@ -376,7 +376,8 @@ impl Work {
         self.fits(region, ask)
     }
 
-    fn fits(&self, region: Region, ask: &Ask) -> bool {
+    /// Whether a worker has time for all of a region.
+    pub(crate) fn fits(&self, region: Region, ask: &Ask) -> bool {
         ask.fits.is_none_or(|fits| !self.exceeds(region, fits))
     }
 
