@@ -26,7 +26,7 @@ impl Sched {
 
     fn admit(&mut self, spec: Submission, out: &mut Vec<Effect>) -> Result<JobId, SubmitRefusal> {
         if let Some(&id) = self.submissions.get(&spec.submission) {
-            let same = self.jobs.get(&id).is_some_and(|job| job.spec == spec);
+            let same = self.is_same(id, spec);
             return same.then_some(id).ok_or(SubmitRefusal::SubmissionReused);
         }
         self.check(&spec)?;
@@ -49,6 +49,21 @@ impl Sched {
         self.jobs.insert(id, job);
         self.job_changed(id);
         Ok(id)
+    }
+
+    /// Whether a job came from this submission. A store does not keep that it waited for jobs that were then finished.
+    fn is_same(&self, id: JobId, mut spec: Submission) -> bool {
+        let Some(job) = self.jobs.get(&id) else {
+            return false;
+        };
+        let is_past = |before: &JobId| {
+            let known = self.jobs.get(before);
+            before.0 <= self.jobs_made
+                && known.is_none_or(|before| before.outcome == Some(JobOutcome::Finished))
+        };
+        let is_kept = |before: &JobId| job.spec.after.contains(before) || !is_past(before);
+        spec.after.retain(is_kept);
+        spec == job.spec
     }
 
     /// The kind of one more job. A kind that is new costs a look at every worker.
