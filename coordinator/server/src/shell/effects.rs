@@ -154,6 +154,9 @@ impl Shell {
             }
             Effect::Forget { worker } => {
                 if let Some(known) = self.workers.remove(&worker) {
+                    if known.draining == Draining::Yes {
+                        self.leaving.add(worker);
+                    }
                     tracing::info!(%worker, name = known.about.name, "a worker left or is lost");
                 }
             }
@@ -252,6 +255,11 @@ impl Shell {
             None => {
                 if let Some(said) = command_words(waiting.command) {
                     self.say(id, said);
+                }
+                if moves_the_end(waiting.command)
+                    && let Some(job) = self.jobs.get_mut(id)
+                {
+                    job.foretold = None;
                 }
                 if waiting.command == Command::Remove && waiting.frames == Frames::Go {
                     self.removing.insert(id);
@@ -593,6 +601,15 @@ fn command_words(command: Command) -> Option<String> {
         ),
         Command::Cancel | Command::Remove => return None,
     })
+}
+
+/// Whether what was expected of a job before says nothing of how right it was.
+fn moves_the_end(command: Command) -> bool {
+    match command {
+        Command::Pause | Command::Resume | Command::Retry | Command::Again(_) => true,
+        Command::Priority(_) | Command::Share(_) => true,
+        Command::Focus(_) | Command::Cancel | Command::Remove => false,
+    }
 }
 
 fn revoke_words(reason: RevokeReason) -> &'static str {
