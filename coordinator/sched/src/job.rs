@@ -84,6 +84,8 @@ pub(crate) struct Tally {
     pub(crate) pixels_again: u64,
     pub(crate) blocks_twice: u64,
     pub(crate) incidents: u64,
+    /// Of those, the ones of which nobody knows yet who is right.
+    pub(crate) undecided: u64,
     pub(crate) unverified: u64,
     pub(crate) seconds: u64,
     pub(crate) called_back: u64,
@@ -214,7 +216,7 @@ impl Job {
     }
 
     /// Whether pixels that are not durable wait for a worker.
-    fn has_missing(&self, config: &Config) -> bool {
+    pub(crate) fn has_missing(&self, config: &Config) -> bool {
         self.may_begin(config) || self.work.values().any(Work::has_missing)
     }
 
@@ -298,7 +300,12 @@ impl Job {
     /// Forgets the pixels of an image in flight.
     pub(crate) fn drop_pixels(&mut self, place: u32) {
         self.tally.pixels_done -= match self.work.remove(&place) {
-            Some(work) => work.pixels.count(),
+            Some(work) => {
+                // Nobody needs to know any more.
+                let doubts = work.doubts().min(self.tally.undecided);
+                self.tally.undecided -= doubts;
+                work.pixels.count()
+            }
             None if self.state(place) == ImageState::Encoding => self.spec.window.area(),
             None => 0,
         };
@@ -397,6 +404,7 @@ impl Job {
             pixels_again: tally.pixels_again,
             blocks_twice: tally.blocks_twice,
             incidents: tally.incidents,
+            undecided: tally.undecided,
             unverified: tally.unverified,
             seconds: tally.seconds,
             called_back: tally.called_back,

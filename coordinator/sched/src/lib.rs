@@ -67,6 +67,6 @@ pub use refusal::{BlockRefusal, CommandRefusal, SubmitRefusal, Verdict, WorkerRe
 pub use sched::Sched;
 pub use view::{
     Estimate, ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused,
-    WorkerView,
+    Trust, WorkerView,
 };
 pub use why::{WhyImage, WhyJob, WhyTile, WhyWorker};

@@ -78,11 +78,13 @@ impl Sched {
         match check.finds(made) {
             Finding::Nothing => {}
             Finding::DissenterWrong { dissenter, first } => {
+                self.decided(job);
                 self.acquit(first, job);
                 self.convict(dissenter, out);
             }
             Finding::FirstWrong { dissenter, first } => {
                 self.report_incident(block, made.by, first, out);
+                self.decided(job);
                 // Its image is rendered again, all of it.
                 self.revoke(number, RevokeReason::RenderedAgain, out);
                 self.acquit(dissenter, job);
@@ -163,6 +165,7 @@ impl Sched {
     ) {
         if let Some(job) = self.jobs.get_mut(&block.image.job) {
             job.tally.incidents += 1;
+            job.tally.undecided += 1;
         }
         let other = Some(other).filter(|&other| other != worker);
         out.push(Effect::Incident {
@@ -170,6 +173,13 @@ impl Sched {
             worker,
             other,
         });
+    }
+
+    /// It is known who was right about a block. What else is doubted of its image goes with that, where it is rendered again.
+    fn decided(&mut self, job: JobId) {
+        if let Some(job) = self.jobs.get_mut(&job) {
+            job.tally.undecided = job.tally.undecided.saturating_sub(1);
+        }
     }
 
     /// Two attempts at a tile made different pixels of a block: the later one ends, and a third decides where there is one.

@@ -523,6 +523,20 @@ impl Work {
         self.pixels.is_complete() && self.checks.is_empty() && self.tiles.is_empty()
     }
 
+    /// Blocks of which two renderings differ and nobody knows which is right.
+    pub(crate) fn doubts(&self) -> u64 {
+        let tiles = self.tiles.iter().map(|(_, tile)| tile);
+        let in_tiles = tiles.flat_map(|tile| {
+            let check = tile.check.iter().map(|check| &check.evidence);
+            check.chain([&tile.evidence])
+        });
+        let pieces = self.pieces.values().chain(&self.troubled);
+        let in_pieces = pieces.map(|piece| &piece.evidence);
+        let in_checks = self.checks.iter().map(|waiting| &waiting.check.evidence);
+        let all = in_tiles.chain(in_pieces).chain(in_checks);
+        all.map(|evidence| evidence.dissents().len() as u64).sum()
+    }
+
     /// The tile that a block is part of, if one is.
     pub(crate) fn tile_of(&self, block: Rect) -> Option<u32> {
         let cell = self.grid.index_of(block)?;

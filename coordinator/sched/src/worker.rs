@@ -10,7 +10,7 @@ use crate::needs::KindSet;
 use crate::pace::{Pace, cost_of, time_of};
 use crate::roster::Place;
 use crate::timers::Alarm;
-use crate::{Link, LinkId, Offer, WorkerView};
+use crate::{Link, LinkId, Offer, Trust, WorkerView};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Worker {
@@ -167,6 +167,10 @@ impl Worker {
             running: attempts - self.idle,
             speed: self.pace.speed(),
             aside: self.aside.farm(),
+            trust: match self.aside.expelled() {
+                Some(_) => Trust::Expelled,
+                None => Trust::Usual,
+            },
             heard: self.heard,
             joined: self.joined,
             blocks: self.blocks,

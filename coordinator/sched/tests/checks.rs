@@ -5,6 +5,7 @@ mod situation;
 use model::{Digest, ImageNumber, JobId, Rect, Span, SubmissionId, WorkerId};
 use sched::{
     Command, Config, Effect, Event, ImageState, Limits, LinkId, Offer, TileShape, Verdict,
+    WhyImage, WhyJob, WhyWorker,
 };
 use situation::*;
 
@@ -255,6 +256,55 @@ fn convicts(farm: &mut Farm) {
     makes(farm, (3, 6), 0, 1, 7);
     makes(farm, (3, 7), 0, 0, 7);
     assert!(is_aside(farm, 1));
+}
+
+#[test]
+fn it_is_said_what_is_verified_and_who_was_expelled() {
+    let farm = nobody_checks();
+    let why = farm.sched.why_job(JobId(1));
+    assert_eq!(why, Some(WhyJob::Verifying { checks: 2 }));
+    let why = farm.sched.why_image(image_ref(0));
+    let verifying = WhyImage::Verifying {
+        attempts: 0,
+        checks: 2,
+    };
+    assert_eq!(why, Some(verifying));
+    assert_eq!(farm.sched.why_worker(worker(1)), Some(WhyWorker::OwnWork));
+    let mut farm = suspicious();
+    convicts(&mut farm);
+    let why = farm.sched.why_worker(worker(1));
+    assert!(matches!(why, Some(WhyWorker::Expelled { .. })), "{why:?}");
+    let sentence = why.map(|why| why.to_string()).unwrap_or_default();
+    assert!(sentence.contains("its pixels were wrong"), "{sentence}");
+}
+
+#[test]
+fn what_differed_is_undecided_until_a_third_has_decided() {
+    let undecided = |farm: &Farm| {
+        let view = farm.sched.job(JobId(1)).expect("it is known");
+        (view.incidents, view.undecided)
+    };
+    let mut farm = suspicious();
+    convicts(&mut farm);
+    farm.command(Command::Again(ImageNumber(0)));
+    assert_eq!(undecided(&farm), (2, 0));
+    // Where nobody else is there, nobody decides.
+    let mut farm = suspicious();
+    farm.job(1).worker(1, 2).worker(2, 0);
+    makes(&mut farm, (1, 1), 0, 0, 7);
+    makes(&mut farm, (1, 2), 0, 1, 7);
+    farm.never_mind();
+    farm.wants_tiles(2, 1);
+    let (id, number, index) = leased(&mut farm).remove(0);
+    makes(&mut farm, (id, number), 0, index, 66);
+    while let Some((_, _, rect)) = farm.sched.attempt(attempt(number + 1)) {
+        makes(&mut farm, (2, number + 1), 0, rect.y0 / 32, 7);
+    }
+    while let Some((id, number, index)) = leased(&mut farm).pop() {
+        makes(&mut farm, (id, number), 0, index, 7);
+    }
+    assert_eq!(state(&farm, 0), ImageState::Encoding);
+    assert_eq!(undecided(&farm), (1, 1));
 }
 
 #[test]
