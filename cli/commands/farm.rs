@@ -99,6 +99,8 @@ struct FarmStatus {
     attempts_live: u32,
     /// Blocks of which two renderings differed.
     incidents: u64,
+    /// Of those, the ones of which no third worker has decided who is right.
+    undecided: u64,
     /// Bytes free on the disk of its state folder; null where not known.
     disk_free_bytes: Option<u64>,
     /// Bytes of that disk.
@@ -122,6 +124,7 @@ impl From<FarmInfo> for FarmStatus {
             threads: info.threads,
             attempts_live: info.attempts_live,
             incidents: info.incidents,
+            undecided: info.undecided,
             disk_free_bytes: info.disk_free_bytes,
             disk_bytes: info.disk_bytes,
             trouble: Some(info.trouble).filter(|trouble| !trouble.is_empty()),
@@ -162,11 +165,11 @@ impl Report for FarmStatus {
                 HumanBytes(all)
             )?;
         }
-        if self.incidents > 0 {
+        if self.undecided > 0 {
             writeln!(
                 out,
                 "  WRONG    {} blocks had two renderings that differ: `flyby farm doctor`",
-                self.incidents
+                self.undecided
             )?;
         }
         match &self.trouble {

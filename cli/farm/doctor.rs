@@ -251,7 +251,7 @@ async fn farm(context: &Context, options: &FarmOptions, state: &Path) -> Vec<Fin
             "ask again in a moment",
         )),
     }
-    findings.push(pixels(info.incidents));
+    findings.push(pixels(info.incidents, info.undecided));
     findings
 }
 
@@ -346,6 +346,8 @@ fn crew(workers: &[Worker], revision: u32, jobs_running: u32) -> Finding {
         .iter()
         .filter(|worker| worker.aside_until_unix_ms.is_some());
     let aside: Vec<_> = aside.map(name).collect();
+    let expelled = workers.iter().filter(|worker| worker.expelled);
+    let expelled: Vec<_> = expelled.map(name).collect();
     let foreign = workers.iter().filter(|worker| worker.revision != revision);
     let foreign: Vec<_> = foreign.map(name).collect();
     if here == 0 && jobs_running > 0 {
@@ -353,6 +355,16 @@ fn crew(workers: &[Worker], revision: u32, jobs_running: u32) -> Finding {
             "workers",
             format!("{jobs_running} jobs wait, and no worker is connected"),
             "start workers with `flyby worker`",
+        );
+    }
+    if !expelled.is_empty() {
+        return Finding::bad(
+            "workers",
+            format!(
+                "{} made wrong pixels where two others agreed, and get no tiles for an hour",
+                expelled.join(", ")
+            ),
+            "those machines compute wrongly: drain their workers; once one is mended, start the coordinator again to let it back at once",
         );
     }
     if !aside.is_empty() {
@@ -378,10 +390,16 @@ fn crew(workers: &[Worker], revision: u32, jobs_running: u32) -> Finding {
     Finding::fine("workers", format!("{here} connected, {away} away"))
 }
 
-fn pixels(incidents: u64) -> Finding {
-    match incidents {
-        0 => Finding::fine("pixels", "no two renderings of a block differed"),
-        count => Finding::bad(
+fn pixels(incidents: u64, undecided: u64) -> Finding {
+    match (undecided, incidents) {
+        (0, 0) => Finding::fine("pixels", "no two renderings of a block differed"),
+        (0, count) => Finding::fine(
+            "pixels",
+            format!(
+                "{count} blocks were rendered twice with different pixels; a third worker decided, and what was wrong is rendered again"
+            ),
+        ),
+        (count, _) => Finding::bad(
             "pixels",
             format!("{count} blocks were rendered twice with different pixels"),
             "`flyby job log` names the workers: one of those machines computes wrongly; drain them, and render those jobs' frames again",

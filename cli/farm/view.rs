@@ -58,6 +58,10 @@ pub(crate) struct Job {
     pub(crate) blocks_twice: u64,
     /// Blocks of which two renderings differed.
     pub(crate) incidents: u64,
+    /// Of those, the ones of which no third worker has decided who is right.
+    pub(crate) undecided: u64,
+    /// Tiles that were to be rendered once more and compared, and were not.
+    pub(crate) unverified: u64,
     /// Tiles of each frame; 0 where they are cut by time.
     pub(crate) tiles_per_image: u32,
     /// Their size, such as `64x64`.
@@ -159,6 +163,8 @@ pub(crate) struct Worker {
     pub(crate) runs_until_unix_ms: Option<u64>,
     /// Until when it gets no tiles, since it failed too many; null where it is trusted.
     pub(crate) aside_until_unix_ms: Option<u64>,
+    /// Whether that is since its pixels were wrong.
+    pub(crate) expelled: bool,
 }
 
 /// `job list`.
@@ -284,6 +290,8 @@ impl From<proto::JobSummary> for Job {
                 .map(|part| format!("{},{},{},{}", part.x0, part.y0, part.x1, part.y1)),
             blocks_twice: job.blocks_twice,
             incidents: job.incidents,
+            undecided: job.undecided,
+            unverified: job.unverified,
             images_total: job.images,
             images_done: job.images_done,
             images_failed: job.images_failed,
@@ -362,6 +370,7 @@ impl From<proto::WorkerStatus> for Worker {
             labels: worker.labels,
             runs_until_unix_ms: time(worker.runs_until_unix_ms),
             aside_until_unix_ms: time(worker.aside_until_unix_ms),
+            expelled: worker.expelled,
         }
     }
 }
@@ -496,11 +505,24 @@ impl Report for Job {
             self.attempts_failed,
             self.attempts_lost
         )?;
-        if self.incidents > 0 {
+        if self.undecided > 0 {
             writeln!(
                 out,
                 "  WRONG   {} blocks were rendered twice with different pixels: `flyby job log {}` names the workers",
-                self.incidents, self.job
+                self.undecided, self.job
+            )?;
+        } else if self.incidents > 0 {
+            writeln!(
+                out,
+                "  {} blocks were rendered twice with different pixels; a third worker decided, and what was wrong is rendered again",
+                self.incidents
+            )?;
+        }
+        if self.unverified > 0 {
+            writeln!(
+                out,
+                "  {} tiles were to be verified and were not: no other worker could render them in time",
+                self.unverified
             )?;
         }
         self.rank(out)?;

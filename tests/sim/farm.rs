@@ -134,7 +134,11 @@ impl Farm {
         while self.now < rest && self.step() {}
         assert!(self.workers.is_empty(), "whoever is asked to stop does");
         assert!(self.coordinator.is_up && self.coordinator.is_at_rest());
-        assert_eq!(self.coordinator.sched.workers().count(), 0);
+        assert_eq!(
+            self.coordinator.sched.workers().count(),
+            0,
+            "every lease ends, and whoever is gone is forgotten"
+        );
         assert_eq!(self.coordinator.disk.images(), [], "scratch files are gone");
         self.coordinator.sched.check_invariants();
         self.user.looks_at(&self.coordinator);

@@ -5,6 +5,7 @@
 //! clears it: only faults in a row tell a broken worker from bad luck. At most half of the
 //! workers are set aside for a job: where more fail, they are not what is broken.
 
+use alloc::collections::{BTreeMap, VecDeque};
 use alloc::vec::Vec;
 
 use model::{JobId, Timestamp, WorkerId};
@@ -25,9 +26,11 @@ pub(crate) struct Aside {
     /// Tiles of a job that it failed and others did, since it did one itself.
     faults: Vec<(JobId, u32)>,
     /// Jobs of which it gets no tile, and until when.
-    jobs: Vec<(JobId, Timestamp)>,
-    /// Until when it gets no tile at all.
+    jobs: BTreeMap<JobId, Timestamp>,
+    /// Until when it gets no tile at all, since it failed.
     farm: Option<Timestamp>,
+    /// Until when it gets no tile at all, since its pixels were wrong.
+    expelled: Option<Timestamp>,
     /// When the first of these is over.
     pub(crate) alarm: Alarm,
 }
@@ -42,18 +45,26 @@ enum Verdict {
 impl Aside {
     /// Until when the worker gets no tile at all.
     pub(crate) fn farm(&self) -> Option<Timestamp> {
-        self.farm
+        self.farm.max(self.expelled)
+    }
+
+    /// The same, where that is for wrong pixels.
+    pub(crate) fn expelled(&self) -> Option<Timestamp> {
+        self.expelled
     }
 
     /// Until when it gets no tile of a job.
     pub(crate) fn job(&self, job: JobId) -> Option<Timestamp> {
-        let entry = self.jobs.iter().find(|(of, _)| *of == job);
-        entry.map(|&(_, until)| until)
+        self.jobs.get(&job).copied()
     }
 
-    /// The jobs of which it gets no tile.
-    pub(crate) fn jobs(&self) -> impl Iterator<Item = JobId> {
-        self.jobs.iter().map(|&(job, _)| job)
+    /// The jobs of which it gets no tile, in order.
+    pub(crate) fn jobs(&self) -> Vec<JobId> {
+        // Mostly there are none, and this is asked at every event.
+        match self.jobs.is_empty() {
+            true => Vec::new(),
+            false => self.jobs.keys().copied().collect(),
+        }
     }
 
     fn fails(&mut self, job: JobId, now: Timestamp, config: &Config) -> Verdict {
@@ -75,10 +86,9 @@ impl Aside {
         }
         self.faults.retain(|&(of, _)| of != job);
         let until = now + config.aside;
-        self.jobs.push((job, until));
+        self.jobs.insert(job, until);
         if self.jobs.len() >= config.jobs_aside_max as usize {
-            // One that is expelled stays so.
-            self.farm = self.farm.max(Some(until));
+            self.farm = Some(until);
         }
         Verdict::AsideForJob
     }
@@ -87,7 +97,7 @@ impl Aside {
     fn suspend(&mut self, job: JobId, until: Timestamp) -> bool {
         let is_new = self.job(job).is_none();
         if is_new {
-            self.jobs.push((job, until));
+            self.jobs.insert(job, until);
         }
         is_new
     }
@@ -101,15 +111,41 @@ impl Aside {
     fn let_back(&mut self, now: Timestamp) -> Vec<JobId> {
         let is_over = |until: Timestamp| until <= now;
         self.farm = self.farm.filter(|&until| !is_over(until));
-        let back = self.jobs.iter().filter(|&&(_, until)| is_over(until));
-        let back = back.map(|&(job, _)| job).collect();
-        self.jobs.retain(|&(_, until)| !is_over(until));
+        self.expelled = self.expelled.filter(|&until| !is_over(until));
+        let back = self.jobs.iter().filter(|&(_, &until)| is_over(until));
+        let back = back.map(|(&job, _)| job).collect();
+        self.jobs.retain(|_, &mut until| !is_over(until));
         back
     }
 
     fn next(&self) -> Option<Timestamp> {
-        let jobs = self.jobs.iter().map(|&(_, until)| until);
-        jobs.chain(self.farm).min()
+        let jobs = self.jobs.values().copied();
+        jobs.chain(self.farm).chain(self.expelled).min()
+    }
+}
+
+/// Workers whose pixels were wrong, whatever became of their links, in the order in which they were expelled.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Expelled(VecDeque<(u64, Timestamp)>);
+
+impl Expelled {
+    /// Remembers a worker by what stays the same when its process is started again; forgets those whose time is over, and the
+    /// first where there are more than `max`.
+    fn add(&mut self, worker: WorkerId, (now, until): (Timestamp, Timestamp), max: usize) {
+        self.0.retain(|&(id, until)| id != worker.id && until > now);
+        self.0.push_back((worker.id, until));
+        while self.0.len() > max {
+            self.0.pop_front();
+        }
+    }
+
+    pub(crate) fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    fn until(&self, worker: WorkerId, now: Timestamp) -> Option<Timestamp> {
+        let entry = self.0.iter().find(|&&(id, _)| id == worker.id);
+        entry.map(|&(_, until)| until).filter(|&until| until > now)
     }
 }
 
@@ -181,7 +217,7 @@ impl Sched {
         };
         let aside = &mut self.workers[place].aside;
         if aside.job(job).is_some() {
-            aside.jobs.retain(|&(of, _)| of != job);
+            aside.jobs.remove(&job);
             let next = aside.next();
             self.timers.set(
                 Timer::LetBack(place),
@@ -196,20 +232,30 @@ impl Sched {
         }
     }
 
-    /// A worker's pixels were wrong: it gets no tile of anything for long.
+    /// A worker's pixels were wrong: it gets no tile of anything for long, whenever it comes back.
     pub(crate) fn expel(&mut self, id: WorkerId, out: &mut Vec<Effect>) {
         let until = self.now + self.config.aside.times(EXPELLED_FOR);
-        let Some(place) = self.workers.place(id) else {
+        let max = self.config.limits.expelled_max;
+        self.expelled.add(id, (self.now, until), max);
+        if let Some(place) = self.workers.place(id) {
+            self.stays_expelled(place);
+            self.call_back_ahead(place, None, RevokeReason::Differs, out);
+            self.worker_changed(place);
+            self.market.touch(self.workers[place].kinds);
+        }
+    }
+
+    /// Sees that a worker that was expelled, under this or an earlier incarnation, gets no tile.
+    pub(crate) fn stays_expelled(&mut self, place: Place) {
+        let worker = &mut self.workers[place];
+        let Some(until) = self.expelled.until(worker.id, self.now) else {
             return;
         };
-        let worker = &mut self.workers[place];
-        worker.aside.farm = Some(until);
+        worker.aside.expelled = Some(until);
         let next = worker.aside.next();
         self.timers
             .set(Timer::LetBack(place), &mut worker.aside.alarm, next);
-        self.call_back_ahead(place, None, RevokeReason::Differs, out);
-        self.worker_changed(place);
-        self.market.touch(self.workers[place].kinds);
+        self.look_at_all_checks();
     }
 
     /// The time of a worker that was set aside is over.

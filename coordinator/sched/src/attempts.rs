@@ -6,13 +6,15 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, ImageRef, WorkerId};
 
-use crate::attempt::{Attempt, Phase};
+use crate::attempt::Phase;
+use crate::roster::Place;
 use crate::timers::Timer;
+use crate::work::Reopened;
 use crate::{Effect, Link, RevokeReason, Sched};
 
 impl Sched {
-    /// Removes a live attempt; its tile waits for another where nobody who can be reached renders it.
-    pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Attempt> {
+    /// Removes a live attempt; its tile waits for another where nobody who can be reached renders it. Says whose it was.
+    pub(crate) fn end_attempt(&mut self, number: u64) -> Option<Place> {
         let mut attempt = self.attempts.remove(number)?;
         self.timers.remove(Timer::Stuck(number), &mut attempt.stuck);
         if let Some(name) = attempt.name {
@@ -38,7 +40,7 @@ impl Sched {
             }
         }
         self.reconsider(attempt.image, attempt.tile);
-        Some(attempt)
+        Some(attempt.worker)
     }
 
     /// Ends a live attempt and tells its worker.
@@ -47,8 +49,8 @@ impl Sched {
         if matches!(reason, RevokeReason::CalledBack | RevokeReason::Paused) {
             self.ends_on_purpose(number);
         }
-        if let Some(ended) = self.end_attempt(number) {
-            let worker = self.workers[ended.worker].id;
+        if let Some(place) = self.end_attempt(number) {
+            let worker = self.workers[place].id;
             out.push(Effect::Revoke {
                 worker,
                 attempt,
@@ -89,8 +91,9 @@ impl Sched {
             [attempts.next(), attempts.next()]
         };
         let mut only = None;
+        let mut reopened = Reopened::Plain;
         match live {
-            [None, _] => work.reopen(number),
+            [None, _] => reopened = work.reopen(number, self.now),
             [Some(one), None] => {
                 let away = self.workers[self.attempts[one].worker].link == Link::Closed;
                 work.share(number, away);
@@ -110,6 +113,9 @@ impl Sched {
                 }
                 state.enlisted = key;
             }
+        }
+        if reopened == Reopened::Checks {
+            self.check_waits(image);
         }
         self.job_changed(image.job);
     }

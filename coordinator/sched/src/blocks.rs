@@ -1,15 +1,15 @@
 //! Blocks: what is durable counts, once.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use model::{Digest, ImageRef, Span, WorkerId};
 
 use crate::attempt::Attempt;
+use crate::check::{Check, Made};
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
-use crate::tile::{Made, Verified};
 use crate::verify::is_drawn;
-use crate::work::Work;
 use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
 
 /// A block that arrived, and what was found about it.
@@ -23,6 +23,15 @@ struct Arrival {
     purpose: Purpose,
     elapsed: Span,
     pixels: Digest,
+}
+
+/// Whose pixels of a block are durable.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Durable {
+    /// Those that have just arrived, all of them.
+    ByThis,
+    /// Some that arrived before.
+    Before,
 }
 
 impl Sched {
@@ -67,8 +76,9 @@ impl Sched {
             return;
         };
         let new = work.pixels.add(rect);
-        if new > 0 {
-            work.made_by(worker);
+        // Nobody is found to lie where nothing is verified.
+        if new > 0 && self.config.verify > 0 {
+            work.makers.insert(worker);
         }
         let tile = work.tile_of(rect);
         let mut tile_done = false;
@@ -112,8 +122,12 @@ impl Sched {
     /// Has an image encoded of which nothing is left to render.
     pub(crate) fn finish_image(&mut self, image: ImageRef, out: &mut Vec<Effect>) {
         if let Some((job, place)) = self.job_and_place(image)
-            && job.work.get(&place).is_some_and(Work::is_finished)
+            && let Some(work) = job.work.get(&place).filter(|work| work.is_finished())
         {
+            if work.unverified > 0 {
+                let tiles = work.unverified;
+                out.push(Effect::Unverified { image, tiles });
+            }
             job.finish_rendering(place);
             out.push(Effect::Encode { image });
         }
@@ -188,6 +202,10 @@ impl Sched {
         if !is_last {
             self.progress(number);
         }
+        let durable = match arrival.new == rect.area() {
+            true => Durable::ByThis,
+            false => Durable::Before,
+        };
         let made = Made {
             rect,
             pixels: arrival.pixels,
@@ -195,13 +213,13 @@ impl Sched {
         };
         if self.is_check(number) {
             self.checked(number, arrival.block, made, out);
-        } else if self.differs(number, made) {
+        } else if self.differs(number, made, durable) {
             self.differed(number, arrival.block, made, out);
         }
     }
 
     /// Compares a block with what the other attempt at its tile made of it, if that is known.
-    fn differs(&mut self, number: u64, made: Made) -> bool {
+    fn differs(&mut self, number: u64, made: Made, durable: Durable) -> bool {
         let verify = self.config.verify;
         let attempt = &self.attempts[number];
         let (image, tile) = (attempt.image, attempt.tile);
@@ -212,12 +230,13 @@ impl Sched {
         let Some(tile) = work.and_then(|work| work.tiles.get_mut(tile)) else {
             return false;
         };
-        if let Some(seen) = tile.seen.iter().find(|seen| seen.rect == made.rect) {
-            return seen.pixels != made.pixels;
+        if let Some(first) = tile.evidence.first(made.rect) {
+            return first.pixels != made.pixels;
         }
         // Only while two are at work on it can there be another one to compare it with, or later.
-        if tile.live_count() > 1 || is_drawn(verify, image, tile.region) {
-            tile.seen.push(made);
+        let is_compared = tile.live_count() > 1 || is_drawn(verify, image, tile.region);
+        if is_compared && durable == Durable::ByThis {
+            tile.evidence.add_first(made);
         }
         false
     }
@@ -226,8 +245,6 @@ impl Sched {
     /// delivered all it was leased for knows; the others are told.
     fn tile_done(&mut self, image: ImageRef, tile: u32, by: WorkerId, out: &mut Vec<Effect>) {
         let verify = self.config.verify;
-        let kind = self.jobs.get(&image.job).map(|job| job.kind);
-        let able = kind.map_or(0, |kind| self.kinds.able(kind));
         let Some((job, place)) = self.job_and_place(image) else {
             return;
         };
@@ -238,11 +255,12 @@ impl Sched {
             return;
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
-        let is_whole = done.seen.len() == done.rect.blocks().count();
-        let is_drawn = is_whole && is_drawn(verify, image, done.region);
-        let doubts = verify > 0 && !done.dissent.is_empty();
-        if able > 1 && (is_drawn || doubts) {
-            done.verified = Verified::Due;
+        let is_drawn = is_drawn(verify, image, done.region)
+            && done.evidence.firsts().len() == done.rect.blocks().count();
+        let is_doubted = verify > 0 && !done.evidence.dissents().is_empty();
+        if is_drawn || is_doubted {
+            let evidence = core::mem::take(&mut done.evidence);
+            done.check = Some(Box::new(Check::of(evidence)));
         }
         let live: [Option<u64>; 2] = {
             let mut attempts = done.attempts();

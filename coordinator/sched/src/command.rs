@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use model::{ImageNumber, JobId, Rect};
+use model::{ImageNumber, ImageRef, JobId, Rect};
 
 use crate::view::Paused;
 use crate::{CommandRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
@@ -33,7 +33,11 @@ pub enum Command {
 impl Sched {
     pub(crate) fn command(&mut self, job: JobId, command: Command, out: &mut Vec<Effect>) {
         let answer = out.len();
-        match self.follow(job, command, out) {
+        let followed = self.follow(job, command, out);
+        if let Command::Again(image) = command {
+            self.answers_again(ImageRef { job, image }, followed);
+        }
+        match followed {
             // Said first, whatever else is to be done.
             Ok(()) => out.insert(answer, Effect::Commanded { job }),
             Err(refusal) => out.push(Effect::CommandRefused { job, refusal }),
@@ -119,7 +123,7 @@ impl Sched {
     /// Lets images of a job that are over wait again; the job goes on.
     fn wait_again(&mut self, id: JobId, places: &[u32]) -> Result<(), CommandRefusal> {
         let max = self.config.limits.jobs_max;
-        let has_room = self.jobs.len() - self.over.len() < max as usize;
+        let has_room = self.has_room_for_job();
         let job = self.jobs.get_mut(&id).ok_or(CommandRefusal::UnknownJob)?;
         if job.outcome == Some(JobOutcome::Cancelled) {
             return Err(CommandRefusal::JobCancelled);

@@ -49,6 +49,8 @@ pub struct Config {
     pub unmeasured_needs: Span,
     /// Of a million tiles, so many are rendered once more by another worker, and compared. 0 is none.
     pub verify: u32,
+    /// After so long in which nobody could do it, a tile is not rendered once more after all.
+    pub verify_wait: Span,
     /// Most tiles of one image, whoever chooses their shape.
     pub max_array_size: u64,
     /// Images of one job that are rendered or encoded at a time, at most…
@@ -89,6 +91,8 @@ pub struct Limits {
     pub failures_kept_max: u32,
     /// Workers known at a time.
     pub workers_max: u32,
+    /// Workers that were expelled and are remembered; beyond it the one that was first is forgotten.
+    pub expelled_max: usize,
     /// Tiles that one worker may hold, whatever credit it asks for.
     pub credit_max: u32,
     /// Largest share of the farm that a job may have.
@@ -137,6 +141,7 @@ impl Config {
             aside: Span::from_secs(300),
             unmeasured_needs: Span::from_secs(30),
             verify: 0,
+            verify_wait: Span::from_secs(300),
             max_array_size: 75_000,
             images_in_flight_max: 256,
             pixels_in_flight_max: 1 << 26,
@@ -167,6 +172,7 @@ impl Default for Limits {
             reason_bytes_max: 2_000,
             failures_kept_max: 1_000,
             workers_max: 10_000,
+            expelled_max: 1_000,
             credit_max: 1_024,
             share_max: 1_000,
             after_max: 16,

@@ -48,16 +48,15 @@ impl Costs {
         let cost = cost.max(1);
         self.pixels = self.pixels.saturating_add(block.area());
         self.cost = self.cost.saturating_add(cost);
-        let Some(square) = self.squares.index_of(block) else {
-            return;
-        };
+        let (square, whole) = self.square(block);
         if self.newest.is_empty() {
             let count = usize::try_from(self.squares.count()).expect("images are limited");
             self.newest = vec![0; count];
         }
-        let whole = self.squares.tile(square).area();
         let cost = scale(cost, whole, block.area()).max(1);
-        let slot = &mut self.newest[square as usize];
+        let Some(slot) = self.newest.get_mut(square) else {
+            return;
+        };
         self.measured += u32::from(*slot == 0);
         *slot = u32::try_from(cost).unwrap_or(u32::MAX);
     }
@@ -79,13 +78,29 @@ impl Costs {
 
     /// What a block is expected to cost, if anything was measured.
     pub(crate) fn of_block(&self, block: Rect) -> Option<u64> {
-        let square = self.squares.index_of(block);
-        let newest = square.and_then(|square| {
-            let cost = *self.newest.get(square as usize)?;
-            let whole = self.squares.tile(square).area();
-            (cost > 0).then(|| scale(u64::from(cost), block.area(), whole))
-        });
-        newest.or_else(|| self.mean(block.area()))
+        let (square, whole) = self.square(block);
+        let newest = self.newest.get(square).copied().unwrap_or(0);
+        match newest > 0 {
+            true => Some(scale(u64::from(newest), block.area(), whole)),
+            false => self.mean(block.area()),
+        }
+    }
+
+    /// The index of a block's grid square, and how many pixels that has in the window. As [`TileGrid::index_of`], whose
+    /// divisions would be counted here at every event.
+    fn square(&self, block: Rect) -> (usize, u64) {
+        let window = self.squares.window();
+        debug_assert!(block.is_block() && window.contains(block));
+        let (left, top) = (block.x0 / GRID_SQUARE, block.y0 / GRID_SQUARE);
+        let first = (window.x0 / GRID_SQUARE, window.y0 / GRID_SQUARE);
+        let columns = window.x1.div_ceil(GRID_SQUARE) - first.0;
+        let index = (top - first.1) * columns + left - first.0;
+        let side = |square: u32, (from, to): (u32, u32)| {
+            let end = (square + 1).saturating_mul(GRID_SQUARE);
+            u64::from(end.min(to) - (square * GRID_SQUARE).max(from))
+        };
+        let whole = side(left, (window.x0, window.x1)) * side(top, (window.y0, window.y1));
+        (index as usize, whole)
     }
 
     /// What blocks are expected to cost together, if anything was measured.
@@ -164,6 +179,9 @@ impl CostMap {
 /// `value · part / whole`, without overflow; the largest number where it does not fit.
 pub(crate) fn scale(value: u64, part: u64, whole: u64) -> u64 {
     let whole = whole.max(1);
+    if part == whole {
+        return value;
+    }
     if let Some(product) = value.checked_mul(part) {
         return product / whole;
     }

@@ -100,6 +100,14 @@ pub enum Effect {
         /// The image.
         image: ImageRef,
     },
+    /// Some tiles of an image were to be rendered once more and compared, and were not: nobody else could. It is
+    /// encoded as it is.
+    Unverified {
+        /// The image.
+        image: ImageRef,
+        /// How many tiles, or parts of some.
+        tiles: u32,
+    },
     /// An image cannot be rendered: commit and feed [`crate::Event::ImageFailed`]. No more of it is leased.
     GiveUp {
         /// The image.
@@ -117,6 +125,7 @@ pub enum Effect {
         other: Option<WorkerId>,
     },
     /// A worker made wrong pixels, and some of this image is of its making: commit and feed [`crate::Command::Again`].
+    /// A few are asked for at a time, the next ones when those are fed.
     RenderAgain {
         /// The image.
         image: ImageRef,

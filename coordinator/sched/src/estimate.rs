@@ -23,7 +23,7 @@ impl Sched {
             .iter()
             .filter(|(_, worker)| worker.kinds.contains(job.kind))
             .filter_map(|(_, worker)| worker.counts())
-            .map(|(_, capacity)| capacity)
+            .map(|counts| counts.capacity)
             .sum();
         if speed == 0 {
             return None;
@@ -50,7 +50,7 @@ impl Sched {
         })
     }
 
-    /// What is left of a job is expected to cost, that with workers included, if anything was measured.
+    /// What is left of a job is expected to cost, that with workers and what waits to be verified included, if anything was measured.
     fn cost_left(&self, job: &Job) -> Option<u64> {
         let open = job.open_cost()?;
         let live = job.live().map(|number| {
@@ -59,7 +59,12 @@ impl Sched {
             let left = wanted.saturating_sub(u64::from(attempt.done()));
             scale(attempt.cost, left, wanted)
         });
-        Some(live.fold(open, u64::saturating_add))
+        let checks = job.work.values().flat_map(|work| &work.checks);
+        let checks = checks.map(|waiting| {
+            let cost = job.costs.of_blocks(waiting.check.blocks());
+            cost.unwrap_or(0)
+        });
+        Some(live.chain(checks).fold(open, u64::saturating_add))
     }
 }
 

@@ -1,7 +1,8 @@
 //! What always holds, in code.
 
+use alloc::vec::Vec;
+
 use crate::attempt::Phase;
-use crate::market::Stage;
 use crate::tile::LIVE_MAX;
 use crate::timers::Timer;
 use crate::{ImageState, JobOutcome, Link, Sched};
@@ -23,6 +24,9 @@ impl Sched {
         self.check_workers();
         self.check_market();
         assert!(self.changed.is_empty(), "every change was reported");
+        assert!(self.unlooked.is_empty(), "every check was looked at");
+        assert!(self.wrong.count() <= self.images as usize);
+        assert!(self.expelled.len() <= self.config.limits.expelled_max);
     }
 
     fn check_jobs(&self) {
@@ -62,8 +66,8 @@ impl Sched {
                 "no pixel is counted twice"
             );
             assert_eq!(
-                job.seat,
-                job.stands(&self.config),
+                job.stands,
+                job.belongs(&self.config),
                 "job {id} stands where it belongs"
             );
         }
@@ -159,13 +163,25 @@ impl Sched {
             assert_eq!(worker.waiting.due().is_some(), worker.is_idle());
             assert_eq!(worker.seat, worker.wants(place));
             assert_eq!(worker.counted, worker.counts());
-            capacity += worker.counted.map_or(0, |(_, capacity)| capacity);
+            capacity += worker.counted.as_ref().map_or(0, |counts| counts.capacity);
             assert!(worker.lost.due().is_some());
-            let is_aside = worker.aside.farm().is_some() || worker.aside.jobs().next().is_some();
+            let is_aside = worker.aside.farm().is_some() || !worker.aside.jobs().is_empty();
             assert_eq!(worker.aside.alarm.due().is_some(), is_aside);
             timers += self.timers.check(Timer::Lost(place), worker.lost);
             timers += self.timers.check(Timer::Waiting(place), worker.waiting);
             timers += self.timers.check(Timer::LetBack(place), worker.aside.alarm);
+        }
+        for (&id, job) in &self.jobs {
+            timers += self.timers.check(Timer::Unverified(id), job.unverified);
+            let checks = job.work.values().flat_map(|work| &work.checks);
+            let wait = self.config.verify_wait;
+            let in_time = |since| {
+                let due = job.unverified.due();
+                due.is_some_and(|due| due <= since + wait)
+            };
+            for waiting in checks {
+                assert!(in_time(waiting.since), "no check waits for ever");
+            }
         }
         for (&name, &number) in &self.adopted {
             assert!(name.epoch < self.config.epoch);
@@ -191,8 +207,13 @@ impl Sched {
             assert_eq!(able.count(), self.kinds.able(job.kind) as usize);
             let aside = self.workers.iter();
             let aside = aside.filter(|(_, worker)| worker.aside.job(*id).is_some());
-            assert_eq!(aside.count(), job.aside as usize);
-            if !job.seat.is_some_and(|(stage, _)| stage == Stage::Open) {
+            let aside: Vec<_> = aside.map(|(_, worker)| worker).collect();
+            assert_eq!(aside.len(), job.aside as usize);
+            let serves = aside
+                .iter()
+                .filter(|worker| worker.is_able() && worker.kinds.contains(job.kind));
+            assert_eq!(serves.count(), job.aside_able as usize);
+            if job.stands.open.is_none() {
                 continue;
             }
             for (place, worker) in self.workers.iter() {
@@ -200,7 +221,7 @@ impl Sched {
                 let is_limited = worker.ends.is_some();
                 let wants = worker.seat.is_some() && worker.kinds.contains(job.kind) && !is_limited;
                 assert!(
-                    !wants || !self.may_take(place, *id),
+                    !wants || self.may_take(place, *id).is_none(),
                     "what can be leased is"
                 );
             }

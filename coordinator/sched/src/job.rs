@@ -1,5 +1,6 @@
 //! A job: its images in order, those in flight, and what was counted.
 
+use alloc::boxed::Box;
 use alloc::collections::{BTreeMap, BTreeSet};
 use alloc::string::String;
 use alloc::sync::Arc;
@@ -9,12 +10,13 @@ use alloc::vec::Vec;
 use model::{ImageNumber, ImageRef, JobId, Rect, Span, Timestamp, WorkerId};
 
 use crate::costs::Costs;
-use crate::market::{Rank, Stage};
+use crate::market::{Rank, Stands};
 use crate::needs::Kind;
 use crate::pace::time_of;
 use crate::places::Places;
 use crate::spread::Spread;
 use crate::tiling::TileGrid;
+use crate::timers::Alarm;
 use crate::view::Paused;
 use crate::work::{Amount, Ask, Work};
 use crate::{
@@ -46,16 +48,22 @@ pub(crate) struct Job {
     encoding: BTreeSet<u32>,
     pub(crate) failures: Vec<ImageFailure>,
     pub(crate) tally: Tally,
-    /// Who rendered the latest images that are rendered.
-    pub(crate) makers: BTreeMap<u32, Vec<WorkerId>>,
+    /// Who rendered the latest images that are rendered, where that may matter.
+    pub(crate) makers: BTreeMap<u32, Box<[WorkerId]>>,
+    /// Of all those images together.
+    pub(crate) makers_count: usize,
     pub(crate) costs: Costs,
     pub(crate) spread: Spread,
     /// Attempts that are their tile's only one, by when they are expected to be done.
     pub(crate) ending: BTreeSet<(Timestamp, u64)>,
-    /// Workers that are set aside for it.
+    /// Workers that are set aside for it…
     pub(crate) aside: u32,
+    /// …and those of them that would take its tiles if they were not.
+    pub(crate) aside_able: u32,
+    /// When the first of its checks that wait has waited for too long, or earlier.
+    pub(crate) unverified: Alarm,
     /// Where it stands in the market.
-    pub(crate) seat: Option<(Stage, Rank)>,
+    pub(crate) stands: Stands,
 }
 
 /// How the images of a job are cut.
@@ -76,6 +84,9 @@ pub(crate) struct Tally {
     pub(crate) pixels_again: u64,
     pub(crate) blocks_twice: u64,
     pub(crate) incidents: u64,
+    /// Of those, the ones of which nobody knows yet who is right.
+    pub(crate) undecided: u64,
+    pub(crate) unverified: u64,
     pub(crate) seconds: u64,
     pub(crate) called_back: u64,
     pub(crate) render_time: Span,
@@ -119,11 +130,14 @@ impl Job {
                 ..Tally::default()
             },
             makers: BTreeMap::new(),
+            makers_count: 0,
             costs: Costs::unknown(spec.window),
             spread: Spread::default(),
             ending: BTreeSet::new(),
             aside: 0,
-            seat: None,
+            aside_able: 0,
+            unverified: Alarm::default(),
+            stands: Stands::default(),
             spec,
         }
     }
@@ -182,23 +196,28 @@ impl Job {
     }
 
     /// Where it belongs in the market.
-    pub(crate) fn stands(&self, config: &Config) -> Option<(Stage, Rank)> {
-        let stage = if !self.goes_on() {
-            None
-        } else if self.has_tiles(config) {
-            Some(Stage::Open)
-        } else if !self.ending.is_empty() {
-            Some(Stage::Ending)
-        } else {
-            None
-        };
+    pub(crate) fn belongs(&self, config: &Config) -> Stands {
+        if !self.goes_on() {
+            return Stands::default();
+        }
         let rank = Rank::new(self.priority, self.tally.attempts_live, self.share, self.id);
-        Some((stage?, rank))
+        let is_open = self.has_tiles(config);
+        // While pixels are missing that nobody renders, whoever has nothing to do does those.
+        let is_ending = !self.ending.is_empty() && !self.has_missing(config);
+        Stands {
+            open: is_open.then_some(rank),
+            ending: is_ending.then_some(rank),
+        }
     }
 
     /// Whether some worker could be given a tile.
     pub(crate) fn has_tiles(&self, config: &Config) -> bool {
         self.may_begin(config) || self.work.values().any(Work::has_open)
+    }
+
+    /// Whether pixels that are not durable wait for a worker.
+    pub(crate) fn has_missing(&self, config: &Config) -> bool {
+        self.may_begin(config) || self.work.values().any(Work::has_missing)
     }
 
     /// Whether this worker could be.
@@ -281,7 +300,12 @@ impl Job {
     /// Forgets the pixels of an image in flight.
     pub(crate) fn drop_pixels(&mut self, place: u32) {
         self.tally.pixels_done -= match self.work.remove(&place) {
-            Some(work) => work.pixels.count(),
+            Some(work) => {
+                // Nobody needs to know any more.
+                let doubts = work.doubts().min(self.tally.undecided);
+                self.tally.undecided -= doubts;
+                work.pixels.count()
+            }
             None if self.state(place) == ImageState::Encoding => self.spec.window.area(),
             None => 0,
         };
@@ -294,7 +318,7 @@ impl Job {
         }
         let image = self.image_ref(place).image;
         self.failures.retain(|failure| failure.image != image);
-        self.makers.remove(&place);
+        self.forget_makers(place);
         self.set_state(place, ImageState::Waiting);
     }
 
@@ -380,6 +404,8 @@ impl Job {
             pixels_again: tally.pixels_again,
             blocks_twice: tally.blocks_twice,
             incidents: tally.incidents,
+            undecided: tally.undecided,
+            unverified: tally.unverified,
             seconds: tally.seconds,
             called_back: tally.called_back,
             render_time: tally.render_time,

@@ -6,9 +6,10 @@ use model::rect::SIDE_MAX;
 use model::{ImageRef, JobId};
 
 use crate::job::{Job, Shape};
-use crate::market::Stage;
+use crate::market::Stands;
 use crate::needs::{Forgotten, Interned, KINDS_MAX, Kind};
 use crate::tiling::{TileGrid, TileRule};
+use crate::timers::Timer;
 use crate::{Effect, JobOutcome, RevokeReason, Sched, Submission, SubmitRefusal, TileShape};
 
 impl Sched {
@@ -25,7 +26,7 @@ impl Sched {
 
     fn admit(&mut self, spec: Submission, out: &mut Vec<Effect>) -> Result<JobId, SubmitRefusal> {
         if let Some(&id) = self.submissions.get(&spec.submission) {
-            let same = self.jobs.get(&id).is_some_and(|job| job.spec == spec);
+            let same = self.is_same(id, spec);
             return same.then_some(id).ok_or(SubmitRefusal::SubmissionReused);
         }
         self.check(&spec)?;
@@ -48,6 +49,21 @@ impl Sched {
         self.jobs.insert(id, job);
         self.job_changed(id);
         Ok(id)
+    }
+
+    /// Whether a job came from this submission. A store does not keep that it waited for jobs that were then finished.
+    fn is_same(&self, id: JobId, mut spec: Submission) -> bool {
+        let Some(job) = self.jobs.get(&id) else {
+            return false;
+        };
+        let is_past = |before: &JobId| {
+            let known = self.jobs.get(before);
+            before.0 <= self.jobs_made
+                && known.is_none_or(|before| before.outcome == Some(JobOutcome::Finished))
+        };
+        let is_kept = |before: &JobId| job.spec.after.contains(before) || !is_past(before);
+        spec.after.retain(is_kept);
+        spec == job.spec
     }
 
     /// The kind of one more job. A kind that is new costs a look at every worker.
@@ -149,7 +165,7 @@ impl Sched {
     /// Sees that another job of so many images can be remembered; jobs that are over make room.
     fn make_room(&mut self, asked: u32, out: &mut Vec<Effect>) -> Result<(), SubmitRefusal> {
         let limits = &self.config.limits;
-        if self.jobs.len() - self.over.len() >= limits.jobs_max as usize {
+        if !self.has_room_for_job() {
             let max = limits.jobs_max;
             return Err(SubmitRefusal::TooManyJobs { max });
         }
@@ -163,6 +179,11 @@ impl Sched {
             return Err(SubmitRefusal::TooManyImages { asked, left });
         }
         Ok(())
+    }
+
+    /// Whether one more job may go on.
+    pub(crate) fn has_room_for_job(&self) -> bool {
+        self.jobs.len() - self.over.len() < self.config.limits.jobs_max as usize
     }
 
     /// Ends a job that is not over.
@@ -240,7 +261,11 @@ impl Sched {
         if let Some(mut job) = self.jobs.remove(&id) {
             self.images -= job.spec.frames.count();
             self.submissions.remove(&job.spec.submission);
-            self.market.place_job(job.kind, &mut job.seat, None);
+            self.timers
+                .remove(Timer::Unverified(id), &mut job.unverified);
+            self.wrong.forget(id);
+            self.market
+                .place_job(job.kind, &mut job.stands, Stands::default());
             if self.kinds.remove(job.kind) == Forgotten::Yes {
                 self.offer_anew();
             }
@@ -259,10 +284,14 @@ impl Sched {
     /// Sees that a job stands where it belongs in the market.
     pub(crate) fn settle_job(&mut self, id: JobId) {
         if let Some(job) = self.jobs.get_mut(&id) {
-            let place = job.stands(&self.config);
-            self.market.place_job(job.kind, &mut job.seat, place);
-            if place.is_some_and(|(stage, _)| stage == Stage::Open) {
+            let stands = job.belongs(&self.config);
+            self.market.place_job(job.kind, &mut job.stands, stands);
+            if stands.open.is_some() {
                 self.market.touch_kind(job.kind);
+            }
+            if job.unverified.due().is_some() && !job.has_checks() {
+                self.timers
+                    .remove(Timer::Unverified(id), &mut job.unverified);
             }
         }
     }

@@ -22,8 +22,7 @@ const UNMAPPED_FACTOR: u64 = 4;
 /// but those that failed at it, which are fewer than this before its image fails.
 const SEATS_LOOKED_AT: usize = 8;
 
-/// Most workers that are helped out with somebody else's work at one event. What is called back may go to
-/// another worker than the one it was called back for, and be worth calling back again.
+/// Most workers that are helped out with somebody else's work at one event.
 const HELPS_MAX: usize = 64;
 
 /// Why a tile is leased.
@@ -42,8 +41,8 @@ impl Sched {
             while let Some(kind) = self.market.touched() {
                 let goes_on = match self.match_kind(kind) {
                     // Where all that waited turns out to be durable, others of its kind are next.
-                    Some((worker, job)) => {
-                        self.lease(worker, job, out) || !self.may_take(worker, job)
+                    Some((worker, job, ask)) => {
+                        self.lease(worker, job, &ask, out) || self.may_take(worker, job).is_none()
                     }
                     None => false,
                 };
@@ -60,34 +59,37 @@ impl Sched {
     /// A worker that serves a kind of which a job has tiles, and the job that its next tile comes from.
     ///
     /// Looks at the first few workers of each group: where none of them finds a job, none of the group does.
-    fn match_kind(&self, kind: Kind) -> Option<(Place, JobId)> {
+    fn match_kind(&self, kind: Kind) -> Option<(Place, JobId, Ask)> {
         self.market.jobs(Stage::Open, kind).next()?;
         let groups = self.market.wanting(kind);
         let first = groups.filter_map(|(kinds, seats)| {
             seats.iter().take(SEATS_LOOKED_AT).find_map(|&seat| {
-                let job = self.next_job(seat.worker, kinds)?;
-                Some((seat, job))
+                let (job, ask) = self.next_job(seat.worker, kinds)?;
+                Some((seat, job, ask))
             })
         });
-        first.min().map(|(seat, job)| (seat.worker, job))
+        let first = first.min_by_key(|&(seat, ..)| seat);
+        first.map(|(seat, job, ask)| (seat.worker, job, ask))
     }
 
     /// The first job in order that has a tile for a worker.
-    pub(crate) fn next_job(&self, worker: Place, kinds: KindSet) -> Option<JobId> {
+    fn next_job(&self, worker: Place, kinds: KindSet) -> Option<(JobId, Ask)> {
         let first = kinds.iter().filter_map(|kind| {
             let mut jobs = self.market.jobs(Stage::Open, kind);
-            jobs.find(|rank| self.may_take(worker, rank.job))
+            jobs.find_map(|rank| Some((rank, self.may_take(worker, rank.job)?)))
         });
-        first.min().map(|rank| rank.job)
+        let first = first.min_by_key(|&(rank, _)| rank);
+        first.map(|(rank, ask)| (rank.job, ask))
     }
 
-    /// Whether a job has a tile for a worker.
-    pub(crate) fn may_take(&self, worker: Place, job: JobId) -> bool {
+    /// How large a tile of a job a worker should have, if there is one for it.
+    pub(crate) fn may_take(&self, worker: Place, job: JobId) -> Option<Ask> {
         let (worker, job) = (&self.workers[worker], &self.jobs[&job]);
-        worker.aside.job(job.id).is_none()
-            && self
-                .ask(worker, job)
-                .is_some_and(|ask| job.has_for(&ask, &self.config))
+        let ask = match worker.aside.job(job.id) {
+            None => self.ask(worker, job),
+            Some(_) => None,
+        };
+        ask.filter(|ask| job.has_for(ask, &self.config))
     }
 
     /// How large a tile of a job a worker should have; `None` where its time is too short for any.
@@ -115,11 +117,16 @@ impl Sched {
             .map(|aim| self.tile_by_time(job, (aim, left), speed));
         Some(Ask {
             worker: worker.id,
-            able: self.kinds.able(job.kind).saturating_sub(job.aside),
+            able: self.able_for(job),
             most,
             fits,
             lasts: left.map(|left| cost_of(left + self.config.tile_time, speed)),
         })
+    }
+
+    /// Workers that take tiles of a job.
+    pub(crate) fn able_for(&self, job: &Job) -> u32 {
+        self.kinds.able(job.kind) - job.aside_able
     }
 
     /// The speed of all threads of workers that take tiles.
@@ -142,19 +149,21 @@ impl Sched {
     }
 
     /// Leases a worker the next tile of a job, if there still is one.
-    fn lease(&mut self, worker: Place, job_id: JobId, out: &mut Vec<Effect>) -> bool {
-        let ask = self.ask(&self.workers[worker], &self.jobs[&job_id]);
+    pub(crate) fn lease(
+        &mut self,
+        worker: Place,
+        job_id: JobId,
+        ask: &Ask,
+        out: &mut Vec<Effect>,
+    ) -> bool {
         let job = self
             .jobs
             .get_mut(&job_id)
             .expect("a job in the market is known");
-        let tile = ask.and_then(|ask| job.take_tile(&ask, &self.config));
+        let tile = job.take_tile(ask, &self.config);
         if let Some((place, tile)) = tile {
             let image = job.image_ref(place);
             self.lease_tile(worker, (image, tile), Purpose::First, out);
-        }
-        if self.config.verify > 0 {
-            self.finish_what_is_not_checked(job_id, out);
         }
         self.job_changed(job_id);
         self.settle_job(job_id);
@@ -198,7 +207,7 @@ impl Sched {
             .tiles
             .get(number)
             .expect("a tile that is leased is there");
-        let mut wanted = work.wanted(tile);
+        let mut wanted = work.wanted(tile, worker.id);
         let rect = tile.rect;
         let cost = match wanted.is_empty() {
             true => job.costs.of_blocks(rect.blocks()),

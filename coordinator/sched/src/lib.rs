@@ -21,6 +21,7 @@ mod aside;
 mod attempt;
 mod attempts;
 mod blocks;
+mod check;
 mod command;
 mod config;
 mod costs;
@@ -55,6 +56,7 @@ mod view;
 mod why;
 mod work;
 mod worker;
+mod wrong;
 
 pub use command::Command;
 pub use config::{Config, IMAGES_IN_FLIGHT_LEAST, Limits, TailGain};
@@ -65,6 +67,6 @@ pub use refusal::{BlockRefusal, CommandRefusal, SubmitRefusal, Verdict, WorkerRe
 pub use sched::Sched;
 pub use view::{
     Estimate, ImageCounts, ImageFailure, ImageState, ImageView, JobState, JobView, Link, Paused,
-    WorkerView,
+    Trust, WorkerView,
 };
 pub use why::{WhyImage, WhyJob, WhyTile, WhyWorker};

@@ -9,7 +9,7 @@ use crate::attempt::Phase;
 use crate::needs::Comes;
 use crate::roster::Place;
 use crate::timers::Timer;
-use crate::worker::Worker;
+use crate::worker::{Counts, Worker};
 use crate::{Effect, Link, LinkId, Offer, RevokeReason, Sched, WorkerRefusal};
 
 impl Sched {
@@ -46,6 +46,11 @@ impl Sched {
         worker.ends = offer.time_left.map(|left| self.now + left);
         worker.offer = offer;
         self.heard(id);
+        self.stays_expelled(place);
+        if known.is_some() {
+            // It may serve less than before.
+            self.look_at_all_checks();
+        }
         let live: Vec<AttemptId> = held
             .iter()
             .copied()
@@ -220,6 +225,10 @@ impl Sched {
                 Timer::Waiting(place) => &mut self.workers[place].waiting,
                 Timer::LetBack(place) => &mut self.workers[place].aside.alarm,
                 Timer::Lost(place) => &mut self.workers[place].lost,
+                Timer::Unverified(job) => {
+                    let job = self.jobs.get_mut(&job);
+                    &mut job.expect("a timer ends with its job").unverified
+                }
             };
             if !self.timers.goes_off(timer, alarm, self.now) {
                 continue;
@@ -229,6 +238,7 @@ impl Sched {
                 Timer::Waiting(place) => self.idle_for_long(place, out),
                 Timer::LetBack(place) => self.let_back(place),
                 Timer::Lost(place) => self.lost(place, out),
+                Timer::Unverified(job) => self.checks_overdue(job, out),
             }
         }
     }
@@ -305,6 +315,7 @@ impl Sched {
                 job.aside -= 1;
             }
         }
+        self.look_at_all_checks();
         out.push(Effect::Forget { worker: worker.id });
     }
 
@@ -332,23 +343,49 @@ impl Sched {
         let worker = &mut self.workers[place];
         let counts = worker.counts();
         if counts != worker.counted {
-            let (before, after) = (worker.counted, counts);
-            worker.counted = counts;
-            let of_kinds = |counted: Option<(_, u64)>| counted.map(|(kinds, _)| kinds);
-            if of_kinds(before) != of_kinds(after) {
-                if let Some((kinds, _)) = before {
-                    self.kinds.count_able(kinds, Comes::Out);
-                    // A tile that failed on all that are left may now go to one of them.
-                    self.market.touch(kinds);
-                }
-                if let Some((kinds, _)) = after {
-                    self.kinds.count_able(kinds, Comes::In);
-                }
-            }
-            self.capacity -= before.map_or(0, |(_, capacity)| capacity);
-            self.capacity += after.map_or(0, |(_, capacity)| capacity);
+            let after = counts.clone();
+            let before = core::mem::replace(&mut worker.counted, counts);
+            self.count_anew(before, after);
         }
+        let worker = &mut self.workers[place];
         let seat = worker.wants(place);
         self.market.place_worker(&mut worker.seat, seat);
+    }
+
+    /// A worker counts for something else than before.
+    fn count_anew(&mut self, before: Option<Counts>, after: Option<Counts>) {
+        let of = |counts: &Option<Counts>| {
+            let counts = counts.as_ref();
+            counts.map(|counts| (counts.kinds, counts.aside.clone()))
+        };
+        if of(&before) != of(&after) {
+            if let Some(before) = &before {
+                self.kinds.count_able(before.kinds, Comes::Out);
+                self.count_aside(before, Comes::Out);
+                // A tile that failed on all that are left may now go to one of them.
+                self.market.touch(before.kinds);
+            }
+            if let Some(after) = &after {
+                self.kinds.count_able(after.kinds, Comes::In);
+                self.count_aside(after, Comes::In);
+            }
+        }
+        let capacity = |counts: Option<Counts>| counts.map_or(0, |counts| counts.capacity);
+        self.capacity -= capacity(before);
+        self.capacity += capacity(after);
+    }
+
+    /// Counts a worker with the jobs that it is set aside for and would serve.
+    fn count_aside(&mut self, counts: &Counts, comes: Comes) {
+        for id in &counts.aside {
+            if let Some(job) = self.jobs.get_mut(id)
+                && counts.kinds.contains(job.kind)
+            {
+                match comes {
+                    Comes::In => job.aside_able += 1,
+                    Comes::Out => job.aside_able -= 1,
+                }
+            }
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! A farm that keeps a scheduler busy, for measuring: workers that answer at once, and a clock that only events move.
 //!
 //! Every worker holds up to two tiles. For every tile its worker asks for another one, and sends its block or, one
-//! time in twenty, says that it failed; once in so many tiles each worker gives a sign of life. It reads no clock:
-//! whoever measures has one. `benches/events.rs` and `flyby bench farm` do.
+//! time in twenty, says that it failed; once in so many tiles each worker gives a sign of life. Images are encoded at
+//! once. It reads no clock: whoever measures has one. `benches/events.rs` and `flyby bench farm` do.
 
 use alloc::collections::{BTreeSet, VecDeque};
 use alloc::vec::Vec;
@@ -179,10 +179,17 @@ impl Load {
     fn tell(&mut self, event: Event) {
         self.events += 1;
         self.sched.handle(self.now, event, &mut self.out);
+        let mut encoded = None;
         for effect in self.out.drain(..) {
-            if let Effect::Lease { worker, lease } = effect {
-                self.held.push_back((worker, lease));
+            match effect {
+                Effect::Lease { worker, lease } => self.held.push_back((worker, lease)),
+                Effect::Encode { image } => encoded = Some(image),
+                _ => {}
             }
+        }
+        if let Some(image) = encoded {
+            let film = Digest([1; 32]);
+            self.tell(Event::ImageEncoded { image, film });
         }
     }
 }

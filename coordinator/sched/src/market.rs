@@ -11,6 +11,9 @@ use model::{JobId, Timestamp};
 use crate::needs::{Kind, KindSet};
 use crate::roster::Place;
 
+/// Groups of workers beyond which those that are empty are forgotten.
+const GROUPS_KEPT: usize = 32;
+
 /// Workers that want tiles and jobs that have some, by the kind of job.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Market {
@@ -27,11 +30,11 @@ pub(crate) struct Market {
 }
 
 /// Workers that are alike: where one of them finds no job, the others need not look.
-#[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Debug)]
+#[derive(Clone, PartialEq, Eq, PartialOrd, Ord, Debug)]
 pub(crate) struct Group {
     pub(crate) kinds: KindSet,
-    /// A job that they are set aside for.
-    pub(crate) aside: Option<JobId>,
+    /// The jobs that they are set aside for, in order.
+    pub(crate) aside: Vec<JobId>,
     /// Whether their time is limited.
     pub(crate) is_limited: bool,
 }
@@ -64,6 +67,13 @@ pub(crate) enum Stage {
     Open,
     /// Tiles that are leased, and could be leased a second time or called back.
     Ending,
+}
+
+/// Where a job stands: it may have both, tiles that suit nobody who is free and others that could be helped.
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
+pub(crate) struct Stands {
+    pub(crate) open: Option<Rank>,
+    pub(crate) ending: Option<Rank>,
 }
 
 impl Seat {
@@ -107,39 +117,49 @@ impl Market {
         if *slot == seat {
             return;
         }
-        if let Some((group, old)) = *slot
-            && let Some(seats) = self.wanting.get_mut(&group)
+        if let Some((group, old)) = slot
+            && let Some(seats) = self.wanting.get_mut(group)
         {
-            seats.remove(&old);
-            if seats.is_empty() {
-                self.wanting.remove(&group);
-            }
+            seats.remove(old);
         }
-        if let Some((group, new)) = seat {
-            self.wanting.entry(group).or_default().insert(new);
+        if let Some((group, new)) = &seat {
+            match self.wanting.get_mut(group) {
+                Some(seats) => drop(seats.insert(*new)),
+                None => self.found(group.clone(), *new),
+            }
             self.touched.add(group.kinds);
             self.came = true;
         }
         *slot = seat;
     }
 
+    /// A group gets its first worker. Groups that are empty are kept, since most are not for long, but not many.
+    fn found(&mut self, group: Group, seat: Seat) {
+        if self.wanting.len() >= GROUPS_KEPT {
+            self.wanting.retain(|_, seats| !seats.is_empty());
+        }
+        self.wanting.insert(group, BTreeSet::from([seat]));
+    }
+
     /// Puts a job where it now belongs; `slot` is where it stood.
-    pub(crate) fn place_job(
-        &mut self,
-        kind: Kind,
-        slot: &mut Option<(Stage, Rank)>,
-        place: Option<(Stage, Rank)>,
-    ) {
-        if *slot == place {
-            return;
+    pub(crate) fn place_job(&mut self, kind: Kind, slot: &mut Stands, stands: Stands) {
+        let moves = [
+            (Stage::Open, slot.open, stands.open),
+            (Stage::Ending, slot.ending, stands.ending),
+        ];
+        for (stage, before, after) in moves
+            .into_iter()
+            .filter(|(_, before, after)| before != after)
+        {
+            let ranks = self.ranks(stage, kind);
+            if let Some(rank) = before {
+                ranks.remove(&rank);
+            }
+            if let Some(rank) = after {
+                ranks.insert(rank);
+            }
         }
-        if let Some((stage, rank)) = *slot {
-            self.ranks(stage, kind).remove(&rank);
-        }
-        if let Some((stage, rank)) = place {
-            self.ranks(stage, kind).insert(rank);
-        }
-        *slot = place;
+        *slot = stands;
     }
 
     /// Whether a worker came or moved since this was last asked.

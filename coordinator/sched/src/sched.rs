@@ -5,6 +5,7 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, ImageRef, JobId, Rect, SubmissionId, Timestamp, WorkerId};
 
+use crate::aside::Expelled;
 use crate::attempt::{Attempt, is_block_of};
 use crate::job::Job;
 use crate::live::Live;
@@ -12,6 +13,7 @@ use crate::market::Market;
 use crate::needs::Kinds;
 use crate::roster::Roster;
 use crate::timers::Timers;
+use crate::wrong::Wrong;
 use crate::{
     BlockRef, BlockRefusal, Config, Effect, Event, ImageFailure, ImageView, JobView, Verdict,
     WorkerView,
@@ -48,6 +50,12 @@ pub struct Sched {
     pub(crate) market: Market,
     /// When it is worth looking again for help that jobs near their end could have.
     pub(crate) help_next: Timestamp,
+    /// Workers that were expelled.
+    pub(crate) expelled: Expelled,
+    /// Images with pixels of theirs.
+    pub(crate) wrong: Wrong,
+    /// Images of which a check may wait in vain.
+    pub(crate) unlooked: Vec<ImageRef>,
     /// Jobs that this event changed, each once.
     pub(crate) changed: Vec<JobId>,
 }
@@ -73,6 +81,9 @@ impl Sched {
             timers: Timers::default(),
             market: Market::default(),
             help_next: Timestamp::default(),
+            expelled: Expelled::default(),
+            wrong: Wrong::default(),
+            unlooked: Vec::new(),
             changed: Vec::new(),
         }
     }
@@ -119,6 +130,8 @@ impl Sched {
             Event::Goodbye { worker } => self.goodbye(worker, out),
             Event::Tick => self.tick(out),
         }
+        self.give_up_lonely_checks(out);
+        self.ask_again(out);
         for index in 0..self.changed.len() {
             self.settle_job(self.changed[index]);
         }

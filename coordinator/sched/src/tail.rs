@@ -85,6 +85,10 @@ impl Sched {
                 if let Some(job) = self.jobs.get_mut(&id) {
                     job.tally.called_back += 1;
                 }
+                // Whom it was called back for begins it: who had it before, or another, would hold it as it was held.
+                if let Some(ask) = self.may_take(place, id) {
+                    self.lease(place, id, &ask, out);
+                }
             }
             Help::Second => self.lease_tile(place, (image, tile), Purpose::Second, out),
         }
@@ -129,6 +133,9 @@ impl Sched {
         let left = finish - self.now;
         let margin = |least: Span| least.max(Span(left.0 / GAIN_PART));
         if self.is_ahead(number) {
+            if !self.fits_whole(attempt.image, attempt.tile, place) {
+                return None;
+            }
             let least = margin(self.config.tail_gain.call_back?);
             return (alone + least < left).then_some(Help::CallBack);
         }
@@ -158,9 +165,23 @@ impl Sched {
         let missing: Vec<Rect> = tile.rect.blocks().filter(is_missing).collect();
         let blocks = missing.len() as u64;
         let cost = job.costs.of_blocks(missing.into_iter())?;
-        let able = self.kinds.able(job.kind).saturating_sub(job.aside);
+        let able = self.able_for(job);
         let suits = tile.trouble.suits(self.workers[place].id, able);
         Some((cost, blocks, suits))
+    }
+
+    /// Whether a worker would be leased all of a tile, were it not leased.
+    fn fits_whole(&self, image: ImageRef, tile: u32, place: Place) -> bool {
+        let Some(job) = self.jobs.get(&image.job) else {
+            return false;
+        };
+        let work = job
+            .place(image.image)
+            .and_then(|place| job.work.get(&place));
+        let tile = work.and_then(|work| Some((work, work.tiles.get(tile)?)));
+        let ask = self.ask(&self.workers[place], job);
+        tile.zip(ask)
+            .is_some_and(|((work, tile), ask)| work.fits(tile.region, &ask))
     }
 
     /// Expects anew of attempts that should have ended by now, a few at a time.

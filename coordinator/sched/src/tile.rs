@@ -1,11 +1,12 @@
 //! A tile: a part of an image that is leased, and what is known against it.
 
+use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use model::{Digest, Rect, WorkerId};
+use model::{Rect, WorkerId};
 
+use crate::check::{Check, Evidence};
 use crate::region::Region;
-use crate::verify::Check;
 
 /// Most live attempts of one tile.
 pub(crate) const LIVE_MAX: usize = 2;
@@ -19,30 +20,10 @@ pub(crate) struct Tile {
     pub(crate) missing: u64,
     pub(crate) trouble: Trouble,
     live: [Option<u64>; LIVE_MAX],
-    /// Blocks that arrived and may be compared with another rendering of them.
-    pub(crate) seen: Vec<Made>,
-    /// Those of them that a second attempt made otherwise.
-    pub(crate) dissent: Vec<Made>,
-    /// What becomes of it when it is done.
-    pub(crate) verified: Verified,
+    /// What was made of its blocks.
+    pub(crate) evidence: Evidence,
     /// Where it is rendered once more: what it is held against.
-    pub(crate) check: Option<Check>,
-}
-
-/// A block as somebody made it.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) struct Made {
-    pub(crate) rect: Rect,
-    pub(crate) pixels: Digest,
-    pub(crate) by: WorkerId,
-}
-
-/// Whether a tile that is done is rendered once more by somebody else.
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub(crate) enum Verified {
-    No,
-    /// As soon as somebody can.
-    Due,
+    pub(crate) check: Option<Box<Check>>,
 }
 
 /// What went wrong with some pixels; it stays with them however they are cut.
@@ -59,16 +40,19 @@ pub(crate) struct Trouble {
 }
 
 impl Tile {
-    pub(crate) fn new(region: Region, rect: Rect, missing: u64, trouble: Trouble) -> Self {
+    /// Pixels of which some are to be rendered.
+    pub(crate) fn new(
+        (region, rect): (Region, Rect),
+        missing: u64,
+        (trouble, evidence): (Trouble, Evidence),
+    ) -> Self {
         Self {
             region,
             rect,
             missing,
             trouble,
             live: [None; LIVE_MAX],
-            seen: Vec::new(),
-            dissent: Vec::new(),
-            verified: Verified::No,
+            evidence,
             check: None,
         }
     }
@@ -80,8 +64,8 @@ impl Tile {
             ..Trouble::default()
         };
         Self {
-            check: Some(check),
-            ..Self::new(region, rect, 0, trouble)
+            check: Some(Box::new(check)),
+            ..Self::new((region, rect), 0, (trouble, Evidence::default()))
         }
     }
 

@@ -6,7 +6,7 @@
 
 use alloc::collections::BTreeSet;
 
-use model::Timestamp;
+use model::{JobId, Timestamp};
 
 use crate::roster::Place;
 
@@ -22,6 +22,8 @@ pub(crate) enum Timer {
     LetBack(Place),
     /// A worker was not heard of for too long.
     Lost(Place),
+    /// Checks of a job wait for too long.
+    Unverified(JobId),
 }
 
 /// When something is due, kept by whomever it concerns.

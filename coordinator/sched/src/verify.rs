@@ -1,64 +1,39 @@
 //! Verification: some tiles are rendered once more by another worker, and compared to the bit.
 //!
 //! Where two differ nobody knows who is right: both get no more of the job until a third has rendered the tile too. Whoever is
-//! alone with its pixels is expelled, and every image that it had a part in is rendered again. An image is encoded when all
-//! checks of its tiles are done. What is drawn is drawn by image and place alone. A restart forgets checks that were not done.
+//! alone with its pixels is expelled, and every image that it had a part in is rendered again ([`crate::wrong`]). What is
+//! drawn is drawn by image and place alone. A restart forgets checks that were not done, and who was expelled.
+//!
+//! An image is encoded when all checks of its tiles are done or given up. A check is given up at once where nobody is
+//! known who could ever do it, and after [`crate::Config::verify_wait`] where nobody can do it then: such workers may be away,
+//! or have too little time left. Time in which its job is held up does not count. Like any lease it is cut down to what fits
+//! into the time that a worker has left, and what was found right is not rendered a third time.
 
+use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
-use model::{ImageRef, JobId, Rect, WorkerId};
+use model::{ImageRef, JobId, Timestamp, WorkerId};
 
+use crate::check::{Check, Finding, Made, Waiting};
 use crate::job::Job;
 use crate::region::Region;
-use crate::tile::{Made, Tile};
+use crate::tile::Tile;
+use crate::timers::Timer;
 use crate::work::Work;
+use crate::worker::Worker;
 use crate::{BlockRef, Effect, RevokeReason, Sched};
 
 /// Tiles of which [`crate::Config::verify`] are rendered once more.
 const OF: u64 = 1_000_000;
 
-/// Rendered images of a job whose makers are remembered; those that come first are forgotten.
-const MAKERS_REMEMBERED: usize = 4_096;
-
-/// A tile that is rendered once more, and what it is held against.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub(crate) struct Check {
-    /// As it is durable.
-    first: Vec<Made>,
-    /// What others made of it that differed.
-    dissent: Vec<Made>,
-    /// All of those.
-    by: Vec<WorkerId>,
-}
-
-impl Check {
-    /// Of blocks that are durable, and what others made of them.
-    pub(crate) fn of(first: Vec<Made>, dissent: Vec<Made>) -> Self {
-        let makers = first.iter().chain(&dissent).map(|made| made.by);
-        let mut by: Vec<WorkerId> = makers.collect();
-        by.sort_unstable();
-        by.dedup();
-        Self { first, dissent, by }
-    }
-
-    /// Whether a worker rendered some of it before.
-    pub(crate) fn is_by(&self, worker: WorkerId) -> bool {
-        self.by.contains(&worker)
-    }
-
-    /// Whether a worker should be given it, of `able` workers that there are. Where they are all of those that rendered it, any
-    /// of them is, to let it be.
-    pub(crate) fn suits(&self, worker: WorkerId, able: u32) -> bool {
-        self.by.len() >= able as usize || !self.is_by(worker)
-    }
-
-    fn first(&self, rect: Rect) -> Option<Made> {
-        self.first.iter().find(|made| made.rect == rect).copied()
-    }
-}
+/// Makers of rendered images of one job that are remembered, of all images together; those of the first are forgotten.
+const MAKERS_REMEMBERED: usize = 1 << 16;
 
 /// Whether a tile is one of those that are rendered once more.
 pub(crate) fn is_drawn(share: u32, image: ImageRef, region: Region) -> bool {
+    if share == 0 {
+        return false;
+    }
     // The finaliser of splitmix64, over what names the tile.
     let mut hash = image.job.0.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     for word in [u64::from(image.image.0), u64::from(region.node)] {
@@ -68,26 +43,6 @@ pub(crate) fn is_drawn(share: u32, image: ImageRef, region: Region) -> bool {
         hash ^= hash >> 31;
     }
     hash % OF < u64::from(share)
-}
-
-/// What a block says about who is right.
-enum Finding {
-    /// It is as it is durable, and so nothing is known against anybody.
-    Nothing,
-    /// It is as it is durable, and this worker had made something else of it.
-    DissenterWrong {
-        dissenter: WorkerId,
-        first: WorkerId,
-    },
-    /// It is as this dissenter made it: what is durable is wrong.
-    FirstWrong {
-        dissenter: WorkerId,
-        first: WorkerId,
-    },
-    /// It is the first that differs.
-    Doubt { first: WorkerId },
-    /// Three differ.
-    Everybody,
 }
 
 impl Sched {
@@ -115,33 +70,34 @@ impl Sched {
         let is_last = self.attempts[number].is_delivered();
         let Some(check) = self
             .checked_tile(number)
-            .and_then(|tile| tile.check.as_mut())
+            .and_then(|tile| tile.check.as_deref_mut())
         else {
             return;
         };
+        let job = block.image.job;
         match check.finds(made) {
             Finding::Nothing => {}
             Finding::DissenterWrong { dissenter, first } => {
-                self.acquit(first, block.image.job);
+                self.decided(job);
+                self.acquit(first, job);
                 self.convict(dissenter, out);
             }
             Finding::FirstWrong { dissenter, first } => {
                 self.report_incident(block, made.by, first, out);
+                self.decided(job);
                 // Its image is rendered again, all of it.
                 self.revoke(number, RevokeReason::RenderedAgain, out);
-                self.acquit(dissenter, block.image.job);
+                self.acquit(dissenter, job);
                 self.convict(first, out);
                 return;
             }
             Finding::Doubt { first } => {
-                check.dissent.push(made);
-                check.by.push(made.by);
-                let by = check.by.clone();
+                let by = check.makers();
                 self.report_incident(block, made.by, first, out);
                 self.revoke(number, RevokeReason::Differs, out);
-                if self.has_another(block.image.job, &by) {
-                    self.doubt(first, block.image.job, out);
-                    self.doubt(made.by, block.image.job, out);
+                if self.has_another(job, &by) {
+                    self.doubt(first, job, out);
+                    self.doubt(made.by, job, out);
                 }
                 return;
             }
@@ -153,27 +109,51 @@ impl Sched {
             }
         }
         if is_last {
-            self.passes(number);
+            self.check_ends(number, made.by, out);
         }
     }
 
-    /// Ends an attempt that could not render something once more, if it is one: what is durable stays as it is.
+    /// A worker has delivered all that it was to render once more.
+    fn check_ends(&mut self, number: u64, by: WorkerId, out: &mut Vec<Effect>) {
+        let tile = self.checked_tile(number);
+        let check = tile.and_then(|tile| tile.check.as_deref());
+        match check.is_some_and(|check| check.suits(by)) {
+            // What it delivered was something else.
+            true => self.check_fails(number, by, out),
+            // What of it is its own work waits for somebody else.
+            false => {
+                self.end_attempt(number);
+            }
+        }
+    }
+
+    /// Ends an attempt that could not render something once more, if it is one: another worker may.
     pub(crate) fn lets_check_be(&mut self, number: u64, out: &mut Vec<Effect>) -> bool {
         let is_check = self.is_check(number);
         if is_check {
-            let image = self.attempts[number].image;
-            self.passes(number);
-            self.finish_image(image, out);
+            let by = self.workers[self.attempts[number].worker].id;
+            self.check_fails(number, by, out);
         }
         is_check
     }
 
-    /// All of it was as it is durable, or nobody can say.
-    fn passes(&mut self, number: u64) {
-        if let Some(tile) = self.checked_tile(number) {
-            tile.check = None;
+    fn check_fails(&mut self, number: u64, by: WorkerId, out: &mut Vec<Effect>) {
+        let max = self.config.tile_failures_max;
+        let image = self.attempts[number].image;
+        let mut given_up = None;
+        if let Some(tile) = self.checked_tile(number)
+            && let Some(mut check) = tile.check.take()
+        {
+            match check.fails(by) >= max {
+                true => given_up = Some(*check),
+                false => tile.check = Some(check),
+            }
         }
         self.end_attempt(number);
+        if let Some(check) = given_up {
+            self.stays_unverified(image, &[check]);
+            self.finish_image(image, out);
+        }
     }
 
     pub(crate) fn report_incident(
@@ -185,6 +165,7 @@ impl Sched {
     ) {
         if let Some(job) = self.jobs.get_mut(&block.image.job) {
             job.tally.incidents += 1;
+            job.tally.undecided += 1;
         }
         let other = Some(other).filter(|&other| other != worker);
         out.push(Effect::Incident {
@@ -192,6 +173,13 @@ impl Sched {
             worker,
             other,
         });
+    }
+
+    /// It is known who was right about a block. What else is doubted of its image goes with that, where it is rendered again.
+    fn decided(&mut self, job: JobId) {
+        if let Some(job) = self.jobs.get_mut(&job) {
+            job.tally.undecided = job.tally.undecided.saturating_sub(1);
+        }
     }
 
     /// Two attempts at a tile made different pixels of a block: the later one ends, and a third decides where there is one.
@@ -203,12 +191,10 @@ impl Sched {
         out: &mut Vec<Effect>,
     ) {
         let (place, job) = (self.attempts[number].worker, block.image.job);
-        let tile = self.checked_tile(number);
-        let seen = tile.as_ref().map(|tile| tile.seen.iter());
-        let first = seen.and_then(|mut seen| seen.find(|seen| seen.rect == made.rect));
-        let first = first.map_or(made.by, |first| first.by);
-        if let Some(tile) = tile {
-            tile.dissent.push(made);
+        let mut first = made.by;
+        if let Some(tile) = self.checked_tile(number) {
+            first = tile.evidence.first(made.rect).map_or(first, |made| made.by);
+            tile.evidence.add_dissent(made);
         }
         self.report_incident(block, made.by, first, out);
         self.revoke(number, RevokeReason::Differs, out);
@@ -219,17 +205,13 @@ impl Sched {
         }
     }
 
-    /// Whether somebody else could render what these did.
+    /// Whether somebody else could render now what these did.
     fn has_another(&self, job: JobId, by: &[WorkerId]) -> bool {
         let Some(job) = self.jobs.get(&job) else {
             return false;
         };
-        self.workers.iter().any(|(_, worker)| {
-            worker.is_able()
-                && worker.kinds.contains(job.kind)
-                && worker.aside.job(job.id).is_none()
-                && !by.contains(&worker.id)
-        })
+        let mut workers = self.workers.iter();
+        workers.any(|(_, worker)| takes_now(worker, job) && !by.contains(&worker.id))
     }
 
     /// A worker's pixels were wrong: nothing that it made is believed.
@@ -240,70 +222,204 @@ impl Sched {
         for number in live {
             self.revoke(number, RevokeReason::Differs, out);
         }
-        let jobs = self.jobs.values();
-        let images = jobs.flat_map(|job| job.images_made_by(worker));
-        out.extend(images.map(|image| Effect::RenderAgain { image, worker }));
+        for job in self.jobs.values_mut() {
+            let places: Vec<u32> = job.images_made_by(worker).collect();
+            for place in places {
+                if let Some(work) = job.work.get_mut(&place) {
+                    work.given_up = true;
+                }
+                self.wrong.add(job.image_ref(place), worker);
+            }
+            self.changed.push(job.id);
+        }
+        self.changed.sort_unstable();
+        self.changed.dedup();
     }
 
-    /// Has images encoded whose last check was let be.
-    pub(crate) fn finish_what_is_not_checked(&mut self, id: JobId, out: &mut Vec<Effect>) {
+    /// A check of an image begins to wait.
+    pub(crate) fn check_waits(&mut self, image: ImageRef) {
+        if let Some(job) = self.jobs.get_mut(&image.job) {
+            let due = self.now + self.config.verify_wait;
+            let due = job.unverified.due().map_or(due, |before| before.min(due));
+            self.timers
+                .set(Timer::Unverified(image.job), &mut job.unverified, Some(due));
+        }
+        self.unlooked.push(image);
+    }
+
+    /// Fewer workers can do checks than before.
+    pub(crate) fn look_at_all_checks(&mut self) {
+        if self.config.verify == 0 {
+            return;
+        }
+        for job in self.jobs.values() {
+            let waits = job.work.iter();
+            let waits = waits.filter(|(_, work)| !work.checks.is_empty());
+            self.unlooked
+                .extend(waits.map(|(&place, _)| job.image_ref(place)));
+        }
+    }
+
+    /// Gives up those checks, of images where that may have changed, that nobody who is known could ever do.
+    pub(crate) fn give_up_lonely_checks(&mut self, out: &mut Vec<Effect>) {
+        while let Some(image) = self.unlooked.pop() {
+            let Some(job) = self.jobs.get(&image.job) else {
+                continue;
+            };
+            let work = job
+                .place(image.image)
+                .and_then(|place| job.work.get(&place));
+            let is_lonely = |waiting: &Waiting| {
+                let mut workers = self.workers.iter();
+                !workers.any(|(_, worker)| could_ever(worker, job, &waiting.check))
+            };
+            let lonely: Vec<bool> = work
+                .into_iter()
+                .flat_map(|work| work.checks.iter().map(is_lonely))
+                .collect();
+            if lonely.contains(&true) {
+                self.give_up_checks(image, &lonely, out);
+            }
+        }
+    }
+
+    /// The time of some checks of a job is over: those that nobody can do now are given up.
+    pub(crate) fn checks_overdue(&mut self, id: JobId, out: &mut Vec<Effect>) {
         let Some(job) = self.jobs.get(&id) else {
             return;
         };
-        let finished = job.work.iter().filter(|(_, work)| work.is_finished());
-        let finished: Vec<ImageRef> = finished.map(|(&place, _)| job.image_ref(place)).collect();
-        for image in finished {
-            self.finish_image(image, out);
+        let overdue = |waiting: &Waiting| waiting.since + self.config.verify_wait <= self.now;
+        let mut given_up: Vec<(u32, Vec<bool>)> = Vec::new();
+        for (&place, work) in &job.work {
+            let is_vain = |waiting: &Waiting| {
+                overdue(waiting) && job.goes_on() && !self.may_do(job, work, waiting)
+            };
+            given_up.push((place, work.checks.iter().map(is_vain).collect()));
         }
+        let now = self.now;
+        let wait = self.config.verify_wait;
+        let Some(job) = self.jobs.get_mut(&id) else {
+            return;
+        };
+        let mut next: Option<Timestamp> = None;
+        for (place, vain) in &given_up {
+            let checks = job.work.get_mut(place).map(|work| &mut work.checks);
+            let waiting = checks.into_iter().flatten().zip(vain);
+            for (waiting, _) in waiting.filter(|&(_, &vain)| !vain) {
+                if waiting.since + wait <= now {
+                    waiting.since = now;
+                }
+                let due = waiting.since + wait;
+                next = Some(next.map_or(due, |next| next.min(due)));
+            }
+        }
+        self.timers
+            .set(Timer::Unverified(id), &mut job.unverified, next);
+        given_up.retain(|(_, vain)| vain.contains(&true));
+        let images: Vec<_> = given_up
+            .into_iter()
+            .map(|(place, vain)| (job.image_ref(place), vain))
+            .collect();
+        for (image, vain) in images {
+            self.give_up_checks(image, &vain, out);
+        }
+    }
+
+    /// Whether some worker would do a check if nothing else were to do.
+    fn may_do(&self, job: &Job, work: &Work, waiting: &Waiting) -> bool {
+        let mut workers = self.workers.iter();
+        workers.any(|(_, worker)| {
+            takes_now(worker, job)
+                && waiting.check.suits(worker.id)
+                && self
+                    .ask(worker, job)
+                    .is_some_and(|ask| work.check_fits(waiting, &ask))
+        })
+    }
+
+    /// Gives up those waiting checks of an image that are marked.
+    fn give_up_checks(&mut self, image: ImageRef, marked: &[bool], out: &mut Vec<Effect>) {
+        let Some((job, place)) = self.job_and_place(image) else {
+            return;
+        };
+        let Some(work) = job.work.get_mut(&place) else {
+            return;
+        };
+        let mut given_up = Vec::new();
+        let checks = core::mem::take(&mut work.checks);
+        for (waiting, &is_given_up) in checks.into_iter().zip(marked) {
+            match is_given_up {
+                true => given_up.push(waiting.check),
+                false => work.checks.push_back(waiting),
+            }
+        }
+        self.stays_unverified(image, &given_up);
+        self.finish_image(image, out);
+    }
+
+    /// What is durable stays as it is, and nobody will ever know better.
+    fn stays_unverified(&mut self, image: ImageRef, checks: &[Check]) {
+        if let Some((job, place)) = self.job_and_place(image) {
+            job.tally.unverified += checks.len() as u64;
+            if let Some(work) = job.work.get_mut(&place) {
+                work.unverified = work
+                    .unverified
+                    .saturating_add(u32::try_from(checks.len()).unwrap_or(u32::MAX));
+            }
+        }
+        for worker in checks.iter().flat_map(Check::doubted) {
+            self.acquit(worker, image.job);
+        }
+        self.job_changed(image.job);
     }
 }
 
-impl Check {
-    fn finds(&self, made: Made) -> Finding {
-        let Some(first) = self.first(made.rect) else {
-            return Finding::Nothing;
-        };
-        let dissent = self
-            .dissent
-            .iter()
-            .find(|dissent| dissent.rect == made.rect);
-        match (made.pixels == first.pixels, dissent) {
-            (true, None) => Finding::Nothing,
-            (true, Some(dissent)) => Finding::DissenterWrong {
-                dissenter: dissent.by,
-                first: first.by,
-            },
-            (false, None) => Finding::Doubt { first: first.by },
-            (false, Some(dissent)) if dissent.pixels == made.pixels => Finding::FirstWrong {
-                dissenter: dissent.by,
-                first: first.by,
-            },
-            (false, Some(_)) => Finding::Everybody,
-        }
-    }
+/// Whether a worker takes tiles of a job at this moment.
+fn takes_now(worker: &Worker, job: &Job) -> bool {
+    worker.is_able() && worker.kinds.contains(job.kind) && worker.aside.job(job.id).is_none()
+}
+
+/// Whether a worker may do a check some time, if it is not lost before.
+fn could_ever(worker: &Worker, job: &Job, check: &Check) -> bool {
+    let serves = worker.kinds.contains(job.kind) && worker.aside.expelled().is_none();
+    serves && check.suits(worker.id)
 }
 
 impl Job {
+    /// Whether something waits to be rendered once more.
+    pub(crate) fn has_checks(&self) -> bool {
+        self.work.values().any(|work| !work.checks.is_empty())
+    }
+
     /// Remembers who rendered an image.
-    pub(crate) fn remember_makers(&mut self, place: u32, makers: Vec<WorkerId>) {
-        self.makers.insert(place, makers);
-        if self.makers.len() > MAKERS_REMEMBERED {
-            self.makers.pop_first();
+    pub(crate) fn remember_makers(&mut self, place: u32, makers: BTreeSet<WorkerId>) {
+        self.forget_makers(place);
+        self.makers_count += makers.len();
+        if !makers.is_empty() {
+            self.makers.insert(place, makers.into_iter().collect());
+        }
+        while self.makers_count > MAKERS_REMEMBERED
+            && let Some((_, forgotten)) = self.makers.pop_first()
+        {
+            self.makers_count -= forgotten.len();
         }
     }
 
-    /// The images that a worker had a part in, as far as that is remembered.
-    fn images_made_by(&self, worker: WorkerId) -> impl Iterator<Item = ImageRef> {
-        let has_part = move |makers: &[WorkerId]| makers.contains(&worker);
+    /// Forgets who rendered an image.
+    pub(crate) fn forget_makers(&mut self, place: u32) {
+        let forgotten = self.makers.remove(&place);
+        self.makers_count -= forgotten.map_or(0, |makers| makers.len());
+    }
+
+    /// The places of images that a worker had a part in, as far as that is remembered.
+    fn images_made_by(&self, worker: WorkerId) -> impl Iterator<Item = u32> {
         let in_flight = self.work.iter();
-        let in_flight = in_flight.filter(move |(_, work): &(_, &Work)| has_part(&work.makers));
+        let in_flight = in_flight.filter(move |(_, work)| work.makers.contains(&worker));
         let rendered = self.makers.iter();
-        let rendered = rendered.filter(move |(_, makers)| has_part(makers));
+        let rendered = rendered.filter(move |(_, makers)| makers.contains(&worker));
         let wanted = self.outcome != Some(crate::JobOutcome::Cancelled);
         let places = in_flight.map(|(&place, _)| place);
         let places = places.chain(rendered.map(|(&place, _)| place));
-        places
-            .filter(move |_| wanted)
-            .map(|place| self.image_ref(place))
+        places.filter(move |_| wanted)
     }
 }

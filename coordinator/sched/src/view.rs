@@ -59,6 +59,10 @@ pub struct JobView<'a> {
     pub blocks_twice: u64,
     /// Blocks of which two renderings differed.
     pub incidents: u64,
+    /// Of those, the ones of which nobody knows who is right: no third worker has decided.
+    pub undecided: u64,
+    /// Tiles that were to be rendered once more, and were not, since nobody could.
+    pub unverified: u64,
     /// Tiles that were leased a second time on purpose.
     pub seconds: u64,
     /// Leases that were called back before they were started.
@@ -188,6 +192,8 @@ pub struct WorkerView {
     pub speed: u32,
     /// Until when it is set aside for the whole farm, if it is.
     pub aside: Option<Timestamp>,
+    /// Whether that is since its pixels were wrong.
+    pub trust: Trust,
     /// When it was last heard of.
     pub heard: Timestamp,
     /// When it joined first.
@@ -198,6 +204,15 @@ pub struct WorkerView {
     pub pixels: u64,
     /// Time its threads took over them.
     pub render_time: Span,
+}
+
+/// What is known of a worker's pixels.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Trust {
+    /// Nothing is known against them.
+    Usual,
+    /// Two others agreed on others.
+    Expelled,
 }
 
 /// Whether a worker can be reached.

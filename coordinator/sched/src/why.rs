@@ -48,6 +48,11 @@ pub enum WhyJob {
         /// Tiles of this job that they hold.
         attempts: u32,
     },
+    /// All its tiles are with workers or done, and some that are done wait to be rendered once more, to be verified.
+    Verifying {
+        /// How many.
+        checks: u32,
+    },
     /// All its tiles are with workers, or done.
     Rendering {
         /// How many are with workers.
@@ -77,6 +82,13 @@ pub enum WhyImage {
         attempts: u32,
         /// Pixels that wait for one.
         pixels_waiting: u64,
+    },
+    /// All its pixels are durable, and some are rendered once more, to be verified.
+    Verifying {
+        /// Tiles of it that are with workers.
+        attempts: u32,
+        /// Tiles that wait for one.
+        checks: u32,
     },
     /// Images of its job that come before it are not all with workers yet.
     Behind {
@@ -122,6 +134,11 @@ pub enum WhyWorker {
         /// Until when.
         until: Timestamp,
     },
+    /// It is set aside for long: its pixels were wrong.
+    Expelled {
+        /// Until when.
+        until: Timestamp,
+    },
     /// It holds as many tiles as it wants.
     Full {
         /// How many.
@@ -145,6 +162,8 @@ pub enum WhyWorker {
     },
     /// What waits failed on it before, and waits for another worker.
     FailedBefore,
+    /// What waits is to be verified, and is its own work or failed on it.
+    OwnWork,
 }
 
 impl Sched {
@@ -159,8 +178,13 @@ impl Sched {
         } else if let Some(&before) = job.after.first() {
             let ended = self.jobs.get(&before).and_then(|before| before.outcome);
             WhyJob::After { job: before, ended }
-        } else if job.has_tiles(&self.config) {
+        } else if job.has_missing(&self.config) {
             self.why_no_worker(id)
+        } else if job.has_checks() {
+            let checks = job.work.values().map(|work| work.checks.len()).sum();
+            WhyJob::Verifying {
+                checks: count_of(checks),
+            }
         } else if attempts > 0 {
             WhyJob::Rendering { attempts }
         } else {
@@ -224,13 +248,22 @@ impl Sched {
             ImageState::Rendering => {
                 let attempts = job.live_of(place).count();
                 let work = job.work.get(&place);
+                if let Some(work) = work.filter(|work| work.pixels.is_complete()) {
+                    return Some(WhyImage::Verifying {
+                        attempts: count_of(attempts),
+                        checks: count_of(work.checks.len()),
+                    });
+                }
                 WhyImage::Rendering {
                     attempts: u32::try_from(attempts).unwrap_or(u32::MAX),
                     pixels_waiting: work.map_or(0, |work| work.open().pixels),
                 }
             }
             ImageState::Waiting => match self.why_job(image.job)? {
-                WhyJob::WorkersBusy { .. } | WhyJob::Rendering { .. } | WhyJob::Encoding { .. } => {
+                WhyJob::WorkersBusy { .. }
+                | WhyJob::Verifying { .. }
+                | WhyJob::Rendering { .. }
+                | WhyJob::Encoding { .. } => {
                     let before = job.in_flight().into_iter().min();
                     let before = before.or(job.first_waiting()).unwrap_or(place);
                     let image = job.image_ref(before).image;
@@ -289,6 +322,8 @@ impl Sched {
         let served = || waits().filter(|job| worker.kinds.contains(job.kind));
         Some(if worker.link == Link::Closed {
             WhyWorker::Away
+        } else if let Some(until) = worker.aside.expelled() {
+            WhyWorker::Expelled { until }
         } else if let Some(until) = worker.aside.farm() {
             WhyWorker::Aside { until }
         } else if worker.credit == 0 {
@@ -306,10 +341,17 @@ impl Sched {
             let aside = |job: &crate::job::Job| Some((job.id, worker.aside.job(job.id)?));
             match served().find_map(aside) {
                 Some((job, until)) => WhyWorker::AsideForJob { job, until },
-                None => WhyWorker::FailedBefore,
+                None if served().any(|job| job.has_missing(&self.config)) => {
+                    WhyWorker::FailedBefore
+                }
+                None => WhyWorker::OwnWork,
             }
         })
     }
+}
+
+fn count_of(count: usize) -> u32 {
+    u32::try_from(count).unwrap_or(u32::MAX)
 }
 
 impl fmt::Display for WhyJob {
@@ -345,6 +387,10 @@ impl fmt::Display for WhyJob {
                 f,
                 "the {workers} workers that could render more of it hold as many tiles as they want, {attempts} of them this job's"
             ),
+            Self::Verifying { checks } => write!(
+                f,
+                "{checks} of its tiles are rendered and wait for another worker to render them once more, to be compared; where none can, the frame is finished without that after a while"
+            ),
             Self::Rendering { attempts } => {
                 write!(f, "its last {attempts} tiles are with workers")
             }
@@ -366,6 +412,10 @@ impl fmt::Display for WhyImage {
             } => write!(
                 f,
                 "the frame is being rendered: {attempts} tiles are with workers, {pixels_waiting} pixels wait for one"
+            ),
+            Self::Verifying { attempts, checks } => write!(
+                f,
+                "the frame is rendered and being verified: {attempts} tiles are with other workers, {checks} wait for one"
             ),
             Self::Behind { image } => {
                 write!(f, "frame {image} and those that follow it come first")
@@ -407,6 +457,9 @@ impl fmt::Display for WhyWorker {
             Self::Aside { .. } => f.write_str(
                 "it failed tiles of several jobs that others rendered, and is set aside for a while",
             ),
+            Self::Expelled { .. } => f.write_str(
+                "its pixels were wrong where two others agreed: it gets no tiles for an hour, or until the coordinator is started again",
+            ),
             Self::Full { attempts } => write!(f, "it holds the {attempts} tiles that it wants"),
             Self::NoTiles => f.write_str("no tile waits for a worker"),
             Self::NoneServed => f.write_str(
@@ -422,6 +475,9 @@ impl fmt::Display for WhyWorker {
             Self::FailedBefore => {
                 f.write_str("the tiles that wait failed on it, and wait for another worker")
             }
+            Self::OwnWork => f.write_str(
+                "the tiles that wait are to be verified by another worker, since it rendered them itself",
+            ),
         }
     }
 }

@@ -10,14 +10,14 @@ use alloc::vec;
 use alloc::vec::Vec;
 use core::cmp::Reverse;
 
-use model::{Rect, WorkerId};
+use model::{Rect, Timestamp, WorkerId};
 
-use crate::costs::CostMap;
+use crate::check::{Checks, Evidence, Waiting};
+use crate::costs::{CostMap, scale};
 use crate::pixels::PixelsDone;
 use crate::region::Region;
-use crate::tile::{Tile, Tiles, Trouble, Verified};
+use crate::tile::{Tile, Tiles, Trouble};
 use crate::tiling::TileGrid;
-use crate::verify::Check;
 
 /// The mark of a cell that is part of no tile.
 const NO_TILE: u32 = u32::MAX;
@@ -32,7 +32,7 @@ pub(crate) struct Work {
     pub(crate) tiles: Tiles,
     /// What its durable blocks cost.
     pub(crate) spent: u64,
-    /// No more of it is leased: it is about to fail.
+    /// No more of it is leased: it is about to fail, or to be rendered again.
     pub(crate) given_up: bool,
     grid: TileGrid,
     map: Option<Arc<CostMap>>,
@@ -44,9 +44,11 @@ pub(crate) struct Work {
     /// Pieces at which some worker failed, in the order in which they did.
     troubled: VecDeque<Piece>,
     /// What is done and is to be rendered once more, by somebody else.
-    checks: VecDeque<(Region, Check)>,
-    /// Who rendered some of it.
-    pub(crate) makers: Vec<WorkerId>,
+    pub(crate) checks: Checks,
+    /// Checks that were given up.
+    pub(crate) unverified: u32,
+    /// Who rendered some of it, where that may matter.
+    pub(crate) makers: BTreeSet<WorkerId>,
     /// Tiles that are open to a second attempt, because the worker of the first is away.
     shared: BTreeSet<u32>,
     /// Of all pieces.
@@ -61,6 +63,16 @@ type Order = (Reverse<bool>, Reverse<u32>, u32);
 struct Piece {
     region: Region,
     trouble: Trouble,
+    evidence: Evidence,
+}
+
+/// What becomes of a tile that nobody renders.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub(crate) enum Reopened {
+    /// It waits to be rendered, or is done.
+    Plain,
+    /// It waits to be rendered once more.
+    Checks,
 }
 
 /// An amount of work, in both of its measures.
@@ -99,24 +111,28 @@ impl Work {
             cells: vec![NO_TILE; count],
             pieces: BTreeMap::new(),
             troubled: VecDeque::new(),
-            checks: VecDeque::new(),
-            makers: Vec::new(),
+            checks: Checks::new(),
+            unverified: 0,
+            makers: BTreeSet::new(),
             shared: BTreeSet::new(),
             open: Amount::default(),
         };
         work.put(Piece {
             region: Region::whole(grid),
             trouble: Trouble::default(),
+            evidence: Evidence::default(),
         });
         work
     }
 
-    /// Whether any tile or piece waits for a worker.
+    /// Whether any tile or piece waits for a worker, or a check does.
     pub(crate) fn has_open(&self) -> bool {
-        let waits = !self.shared.is_empty()
-            || !self.pieces.is_empty()
-            || !self.troubled.is_empty()
-            || !self.checks.is_empty();
+        self.has_missing() || (!self.checks.is_empty() && !self.given_up)
+    }
+
+    /// Whether any pixel that is not durable waits for a worker.
+    pub(crate) fn has_missing(&self) -> bool {
+        let waits = !self.shared.is_empty() || !self.pieces.is_empty() || !self.troubled.is_empty();
         waits && !self.given_up
     }
 
@@ -157,18 +173,7 @@ impl Work {
                 Some(index) => self.troubled.remove(index),
                 None => match self.piece_for(ask) {
                     Some(order) => self.pieces.remove(&order),
-                    None => {
-                        let place = self.check_for(ask)?;
-                        let (region, check) = self.checks.remove(place)?;
-                        if check.is_by(ask.worker) {
-                            // Nobody else is there: nothing can be said about it.
-                            continue;
-                        }
-                        let rect = region.rect(self.grid);
-                        let tile = self.tiles.insert(Tile::to_check(region, rect, check));
-                        self.mark(region, tile);
-                        return Some(tile);
-                    }
+                    None => return self.take_check(ask),
                 },
             }?;
             let amount = self.amount(piece.region);
@@ -178,9 +183,14 @@ impl Work {
             // What other attempts delivered late is not rendered again.
             let rect = piece.region.rect(self.grid);
             let missing = self.missing(rect);
+            let Piece {
+                region,
+                trouble,
+                evidence,
+            } = piece;
             if missing > 0 {
-                let Piece { region, trouble } = piece;
-                let tile = self.tiles.insert(Tile::new(region, rect, missing, trouble));
+                let tile = Tile::new((region, rect), missing, (trouble, evidence));
+                let tile = self.tiles.insert(tile);
                 self.mark(region, tile);
                 return Some(tile);
             }
@@ -202,14 +212,14 @@ impl Work {
         if missing == 0 || !region.indices(self.grid).all(is_free) {
             return None;
         }
-        let trouble = self.take_out(region);
-        let tile = self.tiles.insert(Tile::new(region, rect, missing, trouble));
+        let known = self.take_out(region);
+        let tile = self.tiles.insert(Tile::new((region, rect), missing, known));
         self.mark(region, tile);
         Some(tile)
     }
 
-    /// Takes a region that no tile holds out of the pieces; what went wrong in it.
-    fn take_out(&mut self, region: Region) -> Trouble {
+    /// Takes a region that no tile holds out of the pieces; what went wrong in it, and what was made of it.
+    fn take_out(&mut self, region: Region) -> (Trouble, Evidence) {
         let touches =
             |piece: &Piece| piece.region.contains(region) || region.contains(piece.region);
         let plain = self.pieces.iter().filter(|(_, piece)| touches(piece));
@@ -223,7 +233,7 @@ impl Work {
             .partition::<VecDeque<_>, _>(touches);
         self.troubled = others;
         touched.extend(troubled);
-        let mut trouble = Trouble::default();
+        let (mut trouble, mut evidence) = (Trouble::default(), Evidence::default());
         for mut piece in touched {
             let amount = self.amount(piece.region);
             self.open.pixels -= amount.pixels;
@@ -241,11 +251,13 @@ impl Work {
                 self.put(Piece {
                     region: outside,
                     trouble: piece.trouble.clone(),
+                    evidence: piece.evidence.take(outside.rect(self.grid)),
                 });
                 piece.region = inside;
             }
+            evidence.add(piece.evidence);
         }
-        trouble
+        (trouble, evidence)
     }
 
     /// Live attempts at tiles that hold any of these pixels.
@@ -270,11 +282,68 @@ impl Work {
         })
     }
 
-    /// What this worker may render once more, or let be where nobody else is there to do it.
+    /// What this worker may render once more.
     fn check_for(&self, ask: &Ask) -> Option<usize> {
-        self.checks.iter().position(|(region, check)| {
-            check.suits(ask.worker, ask.able) && self.fits(*region, ask)
+        self.checks.iter().position(|waiting| {
+            waiting.check.suits(ask.worker) && self.part_of_check(waiting, ask).is_some()
         })
+    }
+
+    /// Whether a worker has time for some of a check.
+    pub(crate) fn check_fits(&self, waiting: &Waiting, ask: &Ask) -> bool {
+        self.part_of_check(waiting, ask).is_some()
+    }
+
+    /// The part of a check that a worker has time for: all of it, else its cheaper half, and so on.
+    fn part_of_check(&self, waiting: &Waiting, ask: &Ask) -> Option<Region> {
+        let mut region = waiting.region;
+        loop {
+            let rect = region.rect(self.grid);
+            let left = waiting.check.wanted_in(rect, ask.worker);
+            let of_all = |amount| scale(amount, left, rect.blocks().count() as u64);
+            let Amount { pixels, cost } = self.amount(region);
+            let amount = Amount {
+                pixels: of_all(pixels),
+                cost: of_all(cost),
+            };
+            if ask.fits.is_none_or(|fits| !self.is_more(amount, fits)) {
+                return Some(region);
+            }
+            let (first, second) = region.split()?;
+            let (cheaper, other) = self.choose(first, second, true);
+            let rect = cheaper.rect(self.grid);
+            region = match waiting.check.wanted_in(rect, ask.worker) {
+                0 => other,
+                _ => cheaper,
+            };
+        }
+    }
+
+    /// The tile that this worker is to render once more; the rest of what was one tile waits on.
+    fn take_check(&mut self, ask: &Ask) -> Option<u32> {
+        let mut waiting = self.checks.remove(self.check_for(ask)?)?;
+        let part = self.part_of_check(&waiting, ask)?;
+        while waiting.region != part {
+            let (first, second) = waiting.region.split()?;
+            let (inside, outside) = match first.contains(part) {
+                true => (first, second),
+                false => (second, first),
+            };
+            let check = waiting.check.take(outside.rect(self.grid));
+            if !check.is_done() {
+                self.checks.push_front(Waiting {
+                    region: outside,
+                    check,
+                    since: waiting.since,
+                });
+            }
+            waiting.region = inside;
+        }
+        let Waiting { region, check, .. } = waiting;
+        let rect = region.rect(self.grid);
+        let tile = self.tiles.insert(Tile::to_check(region, rect, check));
+        self.mark(region, tile);
+        Some(tile)
     }
 
     /// A worker that has time enough gets the first piece, others the cheapest.
@@ -307,7 +376,8 @@ impl Work {
         self.fits(region, ask)
     }
 
-    fn fits(&self, region: Region, ask: &Ask) -> bool {
+    /// Whether a worker has time for all of a region.
+    pub(crate) fn fits(&self, region: Region, ask: &Ask) -> bool {
         ask.fits.is_none_or(|fits| !self.exceeds(region, fits))
     }
 
@@ -324,6 +394,7 @@ impl Work {
             self.put(Piece {
                 region: left,
                 trouble: piece.trouble.clone(),
+                evidence: piece.evidence.take(left.rect(self.grid)),
             });
             piece.region = taken;
         }
@@ -358,7 +429,10 @@ impl Work {
     }
 
     fn exceeds(&self, region: Region, most: Amount) -> bool {
-        let amount = self.amount(region);
+        self.is_more(self.amount(region), most)
+    }
+
+    fn is_more(&self, amount: Amount, most: Amount) -> bool {
         match self.map {
             Some(_) => amount.cost > most.cost,
             None => amount.pixels > most.pixels,
@@ -382,22 +456,32 @@ impl Work {
         }
     }
 
-    /// Lets a tile that nobody renders wait again.
-    pub(crate) fn reopen(&mut self, tile: u32) {
+    /// Lets a tile that nobody renders wait again, if something of it is to be rendered.
+    pub(crate) fn reopen(&mut self, tile: u32, now: Timestamp) -> Reopened {
         let Some(tile) = self.close(tile) else {
-            return;
+            return Reopened::Plain;
         };
         let Tile {
-            region, trouble, ..
+            region,
+            trouble,
+            evidence,
+            ..
         } = tile;
         if tile.missing > 0 {
-            self.put(Piece { region, trouble });
-        } else if let Some(check) = tile.check {
-            self.checks.push_back((region, check));
-        } else if tile.verified == Verified::Due {
-            self.checks
-                .push_back((region, Check::of(tile.seen, tile.dissent)));
+            self.put(Piece {
+                region,
+                trouble,
+                evidence,
+            });
+        } else if let Some(check) = tile.check.filter(|check| !check.is_done()) {
+            self.checks.push_back(Waiting {
+                region,
+                check: *check,
+                since: now,
+            });
+            return Reopened::Checks;
         }
+        Reopened::Plain
     }
 
     /// Forgets a tile that is done.
@@ -439,11 +523,18 @@ impl Work {
         self.pixels.is_complete() && self.checks.is_empty() && self.tiles.is_empty()
     }
 
-    /// Notes who rendered some of it.
-    pub(crate) fn made_by(&mut self, worker: WorkerId) {
-        if !self.makers.contains(&worker) {
-            self.makers.push(worker);
-        }
+    /// Blocks of which two renderings differ and nobody knows which is right.
+    pub(crate) fn doubts(&self) -> u64 {
+        let tiles = self.tiles.iter().map(|(_, tile)| tile);
+        let in_tiles = tiles.flat_map(|tile| {
+            let check = tile.check.iter().map(|check| &check.evidence);
+            check.chain([&tile.evidence])
+        });
+        let pieces = self.pieces.values().chain(&self.troubled);
+        let in_pieces = pieces.map(|piece| &piece.evidence);
+        let in_checks = self.checks.iter().map(|waiting| &waiting.check.evidence);
+        let all = in_tiles.chain(in_pieces).chain(in_checks);
+        all.map(|evidence| evidence.dissents().len() as u64).sum()
     }
 
     /// The tile that a block is part of, if one is.
@@ -453,8 +544,13 @@ impl Work {
         (tile != NO_TILE).then_some(tile)
     }
 
-    /// The blocks of a tile that are missing, in order; empty where all are.
-    pub(crate) fn wanted(&self, tile: &Tile) -> Vec<Rect> {
+    /// The blocks of a tile that a worker is to render, in order; empty where all are.
+    pub(crate) fn wanted(&self, tile: &Tile, worker: WorkerId) -> Vec<Rect> {
+        if let Some(check) = &tile.check {
+            let wanted = check.wanted(worker);
+            let is_all = wanted.len() == tile.rect.blocks().count();
+            return if is_all { Vec::new() } else { wanted };
+        }
         if tile.missing == tile.rect.area() {
             return Vec::new();
         }
@@ -510,10 +606,13 @@ impl Work {
                 .iter()
                 .all(|&tile| self.tiles.get(tile).is_some())
         );
-        for (region, _) in &self.checks {
-            let mut cells = region.indices(self.grid);
+        for waiting in &self.checks {
+            let mut cells = waiting.region.indices(self.grid);
             assert!(cells.all(|cell| self.cells[cell] == NO_TILE));
-            assert_eq!(self.missing(region.rect(self.grid)), 0, "it was done");
+            let rect = waiting.region.rect(self.grid);
+            assert_eq!(self.missing(rect), 0, "it was done");
+            assert!(!waiting.check.is_done());
+            assert!(waiting.check.blocks().all(|block| rect.contains(block)));
         }
         assert!(!self.is_finished(), "a complete image is encoded");
     }

@@ -2,7 +2,7 @@
 
 use alloc::vec::Vec;
 
-use model::{Span, Timestamp, WorkerId};
+use model::{JobId, Span, Timestamp, WorkerId};
 
 use crate::aside::Aside;
 use crate::market::{Group, Seat};
@@ -10,7 +10,7 @@ use crate::needs::KindSet;
 use crate::pace::{Pace, cost_of, time_of};
 use crate::roster::Place;
 use crate::timers::Alarm;
-use crate::{Link, LinkId, Offer, WorkerView};
+use crate::{Link, LinkId, Offer, Trust, WorkerView};
 
 #[derive(Clone, Debug)]
 pub(crate) struct Worker {
@@ -48,8 +48,19 @@ pub(crate) struct Worker {
     pub(crate) waiting: Alarm,
     /// Where it stands in the market; `None` while it wants no tile.
     pub(crate) seat: Option<(Group, Seat)>,
-    /// The kinds under which it is counted as able, and what it adds to the farm's capacity.
-    pub(crate) counted: Option<(KindSet, u64)>,
+    /// What it counts for.
+    pub(crate) counted: Option<Counts>,
+}
+
+/// What a worker that takes tiles counts for.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub(crate) struct Counts {
+    /// The kinds under which it counts as able…
+    pub(crate) kinds: KindSet,
+    /// …but for these jobs, in order, which it is set aside for.
+    pub(crate) aside: Vec<JobId>,
+    /// What it adds to the farm's capacity.
+    pub(crate) capacity: u64,
 }
 
 impl Worker {
@@ -91,10 +102,13 @@ impl Worker {
         self.link == Link::Open && self.credit > 0 && self.aside.farm().is_none()
     }
 
-    /// The kinds under which it counts as able, and what it adds to the farm's capacity.
-    pub(crate) fn counts(&self) -> Option<(KindSet, u64)> {
-        let capacity = u64::from(self.offer.threads) * u64::from(self.pace.speed());
-        self.is_able().then_some((self.kinds, capacity))
+    /// What it counts for.
+    pub(crate) fn counts(&self) -> Option<Counts> {
+        self.is_able().then(|| Counts {
+            kinds: self.kinds,
+            aside: self.aside.jobs(),
+            capacity: u64::from(self.offer.threads) * u64::from(self.pace.speed()),
+        })
     }
 
     /// Where it belongs in the market.
@@ -109,7 +123,7 @@ impl Worker {
             );
             let group = Group {
                 kinds: self.kinds,
-                aside: self.aside.jobs().next(),
+                aside: self.aside.jobs(),
                 is_limited: self.ends.is_some(),
             };
             (group, seat)
@@ -153,6 +167,10 @@ impl Worker {
             running: attempts - self.idle,
             speed: self.pace.speed(),
             aside: self.aside.farm(),
+            trust: match self.aside.expelled() {
+                Some(_) => Trust::Expelled,
+                None => Trust::Usual,
+            },
             heard: self.heard,
             joined: self.joined,
             blocks: self.blocks,

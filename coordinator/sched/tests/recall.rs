@@ -2,8 +2,11 @@
 
 mod situation;
 
-use model::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Span, WorkerId};
-use sched::{BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, JobState};
+use model::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Span, SubmissionId, WorkerId};
+use sched::{
+    BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, JobState, Submission,
+    SubmitRefusal,
+};
 use situation::{EPOCH, Farm, film, submission, tile};
 
 fn image(job: u64, image: u32) -> ImageRef {
@@ -114,4 +117,37 @@ fn the_store_forgets_nothing_that_was_not_told() {
     farm.job(1).command(Command::Cancel).is_told(recalled(1, 0));
     let view = farm.sched.job(JobId(1)).unwrap();
     assert_eq!(view.images.encoded, 0);
+}
+
+#[test]
+fn a_job_that_waited_for_one_that_was_finished_is_known_when_it_is_submitted_again() {
+    let mut farm = farm();
+    // The first job was finished and is kept, one before it was forgotten; the store says neither of the second.
+    farm.is_told(Event::JobsRecalled { last: JobId(6) })
+        .is_told(Event::Submit(submission(1, 1)))
+        .is_told(recalled(7, 0))
+        .is_told(Event::Submit(submission(2, 1)))
+        .is_told(Event::Submit(submission(3, 1)))
+        .never_mind();
+    let again = |after: &[u64]| {
+        Event::Submit(Submission {
+            after: after.iter().copied().map(JobId).collect(),
+            ..submission(2, 1)
+        })
+    };
+    let submission = SubmissionId(2);
+    for after in [&[][..], &[7], &[3, 7]] {
+        let job = JobId(8);
+        farm.is_told(again(after))
+            .wants(&[Effect::Submitted { submission, job }]);
+    }
+    // That would be another job.
+    for after in [&[9][..], &[10]] {
+        let refusal = SubmitRefusal::SubmissionReused;
+        let refused = Effect::SubmitRefused {
+            submission,
+            refusal,
+        };
+        farm.is_told(again(after)).wants(&[refused]);
+    }
 }

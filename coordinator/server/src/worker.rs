@@ -1,6 +1,6 @@
 //! What the loop knows of a worker beside what the scheduler knows.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use model::{Timestamp, WorkerId};
 use sched::LinkId;
@@ -25,6 +25,32 @@ pub(crate) struct Worker {
     pub(crate) draining: Draining,
     /// Until when it may run.
     pub(crate) runs_until: Option<Timestamp>,
+}
+
+/// Processes that are remembered after they were told to leave and were lost; those that were lost first are forgotten.
+const LEAVING_MAX: usize = 1_000;
+
+/// Processes that were told to leave, and were lost before it was known that they did.
+#[derive(Debug, Default)]
+pub(crate) struct Leaving(VecDeque<WorkerId>);
+
+impl Leaving {
+    pub(crate) fn add(&mut self, worker: WorkerId) {
+        self.0.retain(|&known| known != worker);
+        self.0.push_back(worker);
+        while self.0.len() > LEAVING_MAX {
+            self.0.pop_front();
+        }
+    }
+
+    /// Whether one that comes back was told to leave; then it is known again, and remembered here no more.
+    pub(crate) fn take(&mut self, worker: WorkerId) -> Draining {
+        let place = self.0.iter().position(|&known| known == worker);
+        match place.and_then(|place| self.0.remove(place)) {
+            Some(_) => Draining::Yes,
+            None => Draining::No,
+        }
+    }
 }
 
 /// Whether a worker is to finish what it holds and leave.
@@ -83,5 +109,28 @@ fn tell<T>(link: &mut Option<Link<T>>, message: T) -> Told {
             *link = None;
             Told::Cut
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn worker(id: u64) -> WorkerId {
+        WorkerId { id, incarnation: 1 }
+    }
+
+    #[test]
+    fn who_was_told_to_leave_is_told_again_once_and_not_too_many_are_remembered() {
+        let mut leaving = Leaving::default();
+        leaving.add(worker(1));
+        assert_eq!(leaving.take(worker(2)), Draining::No);
+        assert_eq!(leaving.take(worker(1)), Draining::Yes);
+        assert_eq!(leaving.take(worker(1)), Draining::No);
+        for id in 0..=LEAVING_MAX as u64 {
+            leaving.add(worker(id));
+        }
+        assert_eq!(leaving.take(worker(0)), Draining::No);
+        assert_eq!(leaving.take(worker(1)), Draining::Yes);
     }
 }

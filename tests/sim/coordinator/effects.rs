@@ -119,6 +119,7 @@ impl Coordinator {
             }
             Effect::Incident { .. } => return self.witness.incidents += 1,
             Effect::JobChanged { .. }
+            | Effect::Unverified { .. }
             | Effect::JobDone { .. }
             | Effect::DropJob { .. }
             | Effect::ForgetJob { .. }

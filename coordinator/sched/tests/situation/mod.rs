@@ -12,8 +12,8 @@ use model::{
     Running, Span, SubmissionId, Timestamp, WorkerId,
 };
 use sched::{
-    BlockRef, Command, Config, Effect, Event, JobOutcome, LinkId, Needs, Offer, RevokeReason,
-    Sched, Submission, TileShape, Verdict,
+    BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, LinkId, Needs, Offer,
+    RevokeReason, Sched, Submission, TileShape, Verdict,
 };
 
 pub(crate) const EPOCH: Epoch = Epoch(3);
@@ -202,6 +202,56 @@ impl Farm {
         let mut effects = std::mem::take(&mut self.effects);
         effects.retain(|effect| !matches!(effect, Effect::JobChanged { .. }));
         effects
+    }
+}
+
+/// Every tile is verified.
+pub(crate) fn suspicious() -> Farm {
+    Farm::new(Config {
+        verify: 1_000_000,
+        ..Config::new(EPOCH)
+    })
+}
+
+/// A worker delivers a tile, of some pixels.
+pub(crate) fn makes(farm: &mut Farm, (id, number): (u64, u64), image: u32, index: u32, pixels: u8) {
+    for rect in tile(index).blocks() {
+        let block = block_ref(number, image, rect);
+        if let Verdict::Refuse(_) = farm.sched.accepts(worker(id), block) {
+            // Its attempt was ended by the block before.
+            continue;
+        }
+        farm.is_told(Event::BlockStored {
+            worker: worker(id),
+            block,
+            elapsed: Span::from_millis(1),
+            pixels: Digest([pixels; 32]),
+        });
+    }
+}
+
+/// The attempts that were leased since somebody last looked, as (worker, number, tile).
+pub(crate) fn leased(farm: &mut Farm) -> Vec<(u64, u64, u32)> {
+    let effects = farm.never_mind();
+    let leases = effects.into_iter().filter_map(|effect| match effect {
+        Effect::Lease { worker, lease } => {
+            Some((worker.id, lease.attempt.number, lease.tile.y0 / 32))
+        }
+        _ => None,
+    });
+    leases.collect()
+}
+
+pub(crate) fn state(farm: &Farm, image: u32) -> ImageState {
+    let view = farm.sched.image(image_ref(image));
+    view.expect("it is there").state
+}
+
+/// Tiles of an image were to be verified and were not.
+pub(crate) fn unverified(image: u32, tiles: u32) -> Effect {
+    Effect::Unverified {
+        image: image_ref(image),
+        tiles,
     }
 }
 

@@ -108,6 +108,13 @@ impl Shell {
                 worker,
                 other,
             } => self.incident(block, worker, other),
+            Effect::Unverified { image, tiles } => {
+                tracing::warn!(job = %image.job, image = %image.image, tiles, "tiles were not verified");
+                self.say(
+                    image.job,
+                    format!("frame {}: {tiles} tiles were not verified, since no other worker could render them in time", image.image),
+                );
+            }
             Effect::Commanded { job } => self.commanded(job, None),
             Effect::CommandRefused { job, refusal } => self.commanded(job, Some(refusal)),
             Effect::RenderAgain { image, worker } => {
@@ -148,6 +155,9 @@ impl Shell {
             }
             Effect::Forget { worker } => {
                 if let Some(known) = self.workers.remove(&worker) {
+                    if known.draining == Draining::Yes {
+                        self.leaving.add(worker);
+                    }
                     tracing::info!(%worker, name = known.about.name, "a worker left or is lost");
                 }
             }
@@ -246,6 +256,11 @@ impl Shell {
             None => {
                 if let Some(said) = command_words(waiting.command) {
                     self.say(id, said);
+                }
+                if moves_the_end(waiting.command)
+                    && let Some(job) = self.jobs.get_mut(id)
+                {
+                    job.foretold = None;
                 }
                 if waiting.command == Command::Remove && waiting.frames == Frames::Go {
                     self.removing.insert(id);
@@ -598,6 +613,15 @@ fn about_ended(summary: &proto::JobSummary, outcome: JobOutcome, job: &Job) -> A
             job.folders().frames.display().to_string(),
         ),
     ]
+}
+
+/// Whether what was expected of a job before says nothing of how right it was.
+fn moves_the_end(command: Command) -> bool {
+    match command {
+        Command::Pause | Command::Resume | Command::Retry | Command::Again(_) => true,
+        Command::Priority(_) | Command::Share(_) => true,
+        Command::Focus(_) | Command::Cancel | Command::Remove => false,
+    }
 }
 
 fn revoke_words(reason: RevokeReason) -> &'static str {

@@ -109,10 +109,8 @@ impl Shell {
             begun,
         };
         // An older link of the same process is dropped with its streams.
-        let draining = self
-            .workers
-            .get(&worker)
-            .map_or(Draining::No, |known| known.draining);
+        let draining = self.workers.get(&worker).map(|known| known.draining);
+        let draining = draining.unwrap_or_else(|| self.leaving.take(worker));
         let runs_until = about.time_left.map(|left| self.now() + left);
         self.workers.insert(
             worker,
@@ -189,7 +187,7 @@ impl Shell {
         self.feed(Event::Command { job, command });
     }
 
-    /// Has workers finish what they hold and leave; one whose link is cut is told when it comes back, unless it is lost before.
+    /// Has workers finish what they hold and leave; one whose link is cut is told when it comes back.
     fn drain(&mut self, whom: &Wanderers) -> Result<proto::WorkerList, Failure> {
         let ids: BTreeSet<WorkerId> = match whom {
             Wanderers::All => self.workers.keys().copied().collect(),

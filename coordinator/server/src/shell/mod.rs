@@ -33,7 +33,7 @@ use crate::input::{Frames, Input, News, Reply};
 use crate::job::{Job, Jobs};
 use crate::state::State;
 use crate::storage::{Era, Hand, Storage};
-use crate::worker::Workers;
+use crate::worker::{Leaving, Workers};
 
 use self::hold::Held;
 pub(crate) use self::recall::Kept;
@@ -55,6 +55,7 @@ pub(crate) struct Shell {
     storage: Storage,
     jobs: Jobs,
     workers: Workers,
+    leaving: Leaving,
     /// Submissions that were fed and are not answered, in order.
     submitting: VecDeque<Submitting>,
     /// The submission that is being fed, until it is a job.
@@ -116,6 +117,7 @@ impl Shell {
             storage,
             jobs: Jobs::default(),
             workers: Workers::new(),
+            leaving: Leaving::default(),
             submitting: VecDeque::new(),
             arriving: None,
             commanding: VecDeque::new(),

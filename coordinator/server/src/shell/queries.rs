@@ -244,6 +244,7 @@ impl Shell {
             attempts_live: views().map(|view| view.attempts).sum(),
             workers_aside: count(connected().filter(|view| view.aside.is_some()).count()),
             incidents: self.sched.jobs().map(|job| job.incidents).sum(),
+            undecided: self.sched.jobs().map(|job| job.undecided).sum(),
             now_unix_ms: self.unix_ms_now(),
             state: self.state.root().display().to_string(),
             // The disk is asked by who has the time.

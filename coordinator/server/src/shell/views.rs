@@ -86,6 +86,8 @@ pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
         focus: view.focus.map(Into::into),
         blocks_twice: view.blocks_twice,
         incidents: view.incidents,
+        unverified: view.unverified,
+        undecided: view.undecided,
         left: None,
     }
 }
@@ -223,5 +225,6 @@ pub(super) fn worker_status(view: &WorkerView, known: Option<&Worker>) -> proto:
             .map_or(0, unix_ms),
         aside_until_unix_ms: view.aside.map_or(0, unix_ms),
         draining: known.is_some_and(|worker| worker.draining == Draining::Yes),
+        expelled: view.trust == sched::Trust::Expelled,
     }
 }
