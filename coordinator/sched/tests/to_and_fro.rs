@@ -33,6 +33,8 @@ enum Trouble {
     Slow,
     /// Workers stand still for up to three seconds.
     Freezes,
+    /// The coordinator stands still for up to three seconds.
+    Pauses,
     /// Workers are lost and come back.
     Losses,
     /// Workers must be gone soon.
@@ -75,6 +77,10 @@ struct World {
     out: Vec<Effect>,
     workers: Vec<Worker>,
     random: Random,
+    /// The coordinator hears nothing before…
+    paused_until: Timestamp,
+    /// …and then of these blocks.
+    late: Vec<(u64, sched::BlockRef, Span)>,
     links: u64,
     counted: Counted,
 }
@@ -169,8 +175,18 @@ impl World {
             }
         }
         worker.held.retain(|held| !held.blocks.is_empty());
-        for (block, elapsed) in stored {
-            let worker = situation::worker(id);
+        let stored = stored.into_iter();
+        self.late
+            .extend(stored.map(|(block, elapsed)| (id, block, elapsed)));
+        if self.paused_until <= now {
+            self.hears();
+        }
+    }
+
+    /// The coordinator takes what arrived.
+    fn hears(&mut self) {
+        for (id, block, elapsed) in std::mem::take(&mut self.late) {
+            let worker = worker(id);
             if let Verdict::Refuse(_) = self.sched.accepts(worker, block) {
                 continue;
             }
@@ -210,6 +226,9 @@ impl World {
         if is(Trouble::Freezes) && self.random.below(3) == 0 {
             let until = self.now + Span(self.random.below(3_000_000));
             self.workers[place].frozen_until = until;
+        }
+        if is(Trouble::Pauses) && self.random.below(3) == 0 {
+            self.paused_until = self.now + Span(self.random.below(3_000_000));
         }
         if is(Trouble::Losses) && self.random.below(10) == 0 {
             self.leaves(place);
@@ -259,6 +278,8 @@ fn lives_through(key: u64, trouble: Trouble, tiles: TileShape) -> Counted {
         out: Vec::new(),
         workers,
         random,
+        paused_until: Timestamp(0),
+        late: Vec::new(),
         links: 0,
         counted: Counted::default(),
     };
@@ -280,9 +301,12 @@ fn lives_through(key: u64, trouble: Trouble, tiles: TileShape) -> Counted {
         world.now = world.now + STEP;
         for place in 0..world.workers.len() {
             world.works(place);
-            if step.is_multiple_of(100) {
+            if step.is_multiple_of(100) && world.paused_until <= world.now {
                 world.beats(place);
             }
+        }
+        if world.paused_until > world.now {
+            continue;
         }
         if step % 100 == 50 {
             world.goes_wrong(trouble);
@@ -318,6 +342,7 @@ fn leases_stay_in_proportion_to_tiles() {
             Trouble::Nothing,
             Trouble::Slow,
             Trouble::Freezes,
+            Trouble::Pauses,
             Trouble::Losses,
             Trouble::Limits,
             Trouble::Everything,
