@@ -144,7 +144,8 @@ impl Plan {
             workers: 1 + random.below(5),
             jobs: 1 + random.below(3),
             images: 1 + random.below(6),
-            verify: 30_000,
+            // In every second farm nothing may be rendered twice on purpose.
+            verify: if key.is_multiple_of(2) { 0 } else { 30_000 },
             troubles,
             bug: None,
         }

@@ -75,7 +75,7 @@ impl Coordinator {
             sched: Sched::new(config(1, &plan)),
             disk: Disk::default(),
             store: Memory::new(),
-            witness: Witness::default(),
+            witness: Witness::new(plan.verify > 0),
             plan,
             epoch: 1,
             is_up: true,
