@@ -26,7 +26,7 @@ use crate::simd::SimdLevel;
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
 pub(crate) use ahead::Ahead;
-pub use ahead::Outlook;
+pub use ahead::{Outlook, Sides};
 pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
@@ -213,10 +213,13 @@ impl Program {
         self.walks
     }
 
-    /// [`Program::evaluate_along`], and how far ahead of each place along its direction the first root is positive.
+    /// [`Program::evaluate_along`], and how far ahead of each place along its direction the first root is positive, and
+    /// how far behind it.
     ///
-    /// `ahead` holds a first guess of that for each place, and then a distance that is proven, 0 if nothing is;
-    /// it may be a few times the guess, or up to the limit if the program [walks](Self::walks). It is proven for values as they are computed.
+    /// `ahead` and `behind` get distances that are proven for values as they are computed, 0 if nothing is; of programs that
+    /// [walk](Self::walks) up to the limit ahead, of others no farther than outlooks say, and behind only if they look there.
+    /// `bend` holds how fast the range of the derivative is thought to spread with the distance from the place, in the
+    /// field's unit per square metre, 0 if nothing is known of it, and gets how fast it was seen to.
     ///
     /// # Panics
     /// If the slices differ in length or are longer than a batch, or if the program does not look ahead.
@@ -227,14 +230,15 @@ impl Program {
         direction: [&[f64]; 3],
         outlook: Outlook<'_>,
         scratch: &mut Scratch,
-        [value, slope, ahead]: [&mut [f64]; 3],
+        [value, slope, ahead, behind, bend]: [&mut [f64]; 5],
     ) {
         let n = points.len();
         assert!(
             n <= BATCH
-                && [&*value, &*slope, &*ahead]
+                && [&*value, &*slope, &*ahead, &*behind, &*bend]
                     .iter()
                     .chain(&[outlook.offset, outlook.slope, outlook.limit])
+                    .chain(&[outlook.least, outlook.most])
                     .chain(&direction)
                     .all(|slice| slice.len() == n),
             "the slices are as long as the batch, and that is one"
@@ -256,8 +260,12 @@ impl Program {
         dispatch!(level.token(), simd => {
             along.run(simd, &self.code, points, 0, noise_evaluations);
             match walk::blobs(&self.code) {
-                Some(blobs) if self.walks => walk::run(simd, blobs, along, root, outlook, ahead),
-                _ => stretches.run(simd, &self.code, along, outlook, root, ahead),
+                Some(blobs) if self.walks => {
+                    ahead.copy_from_slice(outlook.most);
+                    behind.fill(0.0);
+                    walk::run(simd, blobs, along, root, outlook, ahead);
+                }
+                _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
             }
         });
         let duals = along.register(root);

@@ -1,14 +1,16 @@
-//! How far ahead of a place a field has no root: its derivative bounded on the stretch of the ray before it.
+//! How far ahead of a place and behind it a field has no root: its derivative bounded on the stretch of the ray around it.
 //!
-//! One evaluation with its derivative gives every noise n and its derivative n′ at the place. On the stretch of
-//! length s before it no derivative of the noise leaves n′ ± (B s + …), for the second derivatives of a noise
-//! have a bound B, and so no value leaves n + [0, s]·n′. These ranges go through the code as
+//! One evaluation with its derivative gives every noise n and its derivative n′ at the place. Within a distance
+//! s of it no derivative of the noise leaves n′ ± (B s + …), for the second derivatives of a noise
+//! have a bound B, and so no value leaves n + [−s, s]·n′. These ranges go through the code as
 //! [`stretch::Stretch`]es, without another noise, and give the field's least derivative m on the stretch: by the
-//! mean value theorem f(x) + m s bounds the field from below. What an octave weighs, and so how steep it can
+//! mean value theorem f(x) + m s bounds the field from below; behind, its greatest does. What an octave weighs, and so how steep it can
 //! be, is known at the place: far less than anywhere. Segment tracing (Galin et al. 2020) does this with
 //! Lipschitz bounds; with second derivatives rays close in on roots like Newton's method.
 //!
-//! Where the guess of a stretch was too long, as much of it is clear as its slope allows.
+//! How long a stretch should be follows from how far the derivative's range spread on the one before, per metre: to where
+//! it would be just clear. A longer one has a wider range, and less of it is clear than of the right one; there as much
+//! of it is clear as its slope allows.
 
 mod lanes;
 mod octaves;
@@ -21,7 +23,7 @@ use crate::number::Number;
 use crate::program::code::{Code, FOOTPRINT, Instruction, Operation, TIME};
 use crate::program::machine;
 use crate::program::slopes::Slopes;
-use lanes::{Stretches, WIDTH, row};
+use lanes::{Here, Stretches, WIDTH, row};
 use octaves::{Growth, Octaves};
 use stretch::{Stretch, least, most};
 
@@ -35,8 +37,33 @@ pub struct Outlook<'a> {
     pub slope: &'a [f64],
     /// How far ahead anything is worth knowing, metres.
     pub limit: &'a [f64],
+    /// How far to look at least, metres; more than 0.
+    pub least: &'a [f64],
+    /// How far to look at most, metres, and where nothing else says how far.
+    pub most: &'a [f64],
     /// How fast footprints grow along a ray at most.
     pub footprint_slope: f64,
+    /// Where to look.
+    pub sides: Sides,
+}
+
+/// On which sides of a place a stretch lies.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Sides {
+    /// Ahead alone.
+    Ahead,
+    /// As far behind the place as ahead of it: nearly twice as much is seen for the same work, by somewhat wider ranges.
+    Both,
+}
+
+impl Sides {
+    /// How far stretches reach behind, as a share of how far they reach ahead.
+    fn back(self) -> f64 {
+        match self {
+            Self::Ahead => 0.0,
+            Self::Both => 1.0,
+        }
+    }
 }
 
 /// The registers of stretches.
@@ -82,8 +109,8 @@ impl Ahead {
         machine::prepare(registers, constants, code, Stretches::new, set);
     }
 
-    /// How far ahead of some places no root can be, from `length` as a first guess, which it replaces. What the
-    /// code gave at the places is in `along`.
+    /// How far ahead of some places no root can be, and how far behind them. It looks as far as it guesses from `bend`,
+    /// which it replaces. What the code gave at the places is in `along`.
     #[inline(always)]
     pub(crate) fn run<S: Simd>(
         &mut self,
@@ -92,15 +119,29 @@ impl Ahead {
         along: &Slopes<1>,
         outlook: Outlook<'_>,
         root: usize,
-        length: &mut [f64],
+        [ahead, behind, bend]: [&mut [f64]; 3],
     ) {
-        let value = &along.register(root).value;
-        for (chunk, length) in length.chunks_mut(WIDTH).enumerate() {
+        let duals = along.register(root);
+        let (value, slope) = (&duals.value, &duals.gradient[0]);
+        let back = outlook.sides.back();
+        self.octaves.back = back;
+        let chunks = ahead.chunks_mut(WIDTH).zip(behind.chunks_mut(WIDTH));
+        let chunks = chunks.zip(bend.chunks_mut(WIDTH)).enumerate();
+        for (chunk, ((ahead, behind), bend)) in chunks {
             let start = chunk * WIDTH;
-            let points = length.len();
+            let points = ahead.len();
+            let end = start + points;
+            let here = Here {
+                value: &value[start..end],
+                slope: &slope[start..end],
+                offset: &outlook.offset[start..end],
+                error: &outlook.slope[start..end],
+            };
+            let (least, most) = (&outlook.least[start..end], &outlook.most[start..end]);
             let row = &mut self.octaves.length;
-            row[..points].copy_from_slice(length);
-            row[points..].fill(length[points - 1]);
+            here.guess(bend, [least, most], row);
+            let last = row[points - 1];
+            row[points..].fill(last);
             self.inputs(start, along);
             let mut place = Place {
                 start,
@@ -117,22 +158,22 @@ impl Ahead {
                 );
                 std::mem::swap(&mut self.registers[instruction.result], &mut self.result);
             }
-            let end = start + points;
-            let errors = [&outlook.offset[start..end], &outlook.slope[start..end]];
-            self.registers[root].clear(&value[start..end], errors, length);
+            let length = &self.octaves.length;
+            self.registers[root].clear(here, length, back, [ahead, behind, bend]);
         }
     }
 
     /// The places' own stretches.
     #[inline(always)]
     fn inputs(&mut self, start: usize, along: &Slopes<1>) {
-        let length = &self.octaves.length;
+        let (length, back) = (&self.octaves.length, self.octaves.back);
         for (i, register) in self.registers[..3].iter_mut().enumerate() {
             let from = along.register(i);
             let (at, slope) = (row(&from.value, start), row(&from.gradient[0], start));
             for lane in 0..WIDTH {
-                let end = at[lane] + slope[lane] * length[lane];
-                let ends = (least(at[lane], end), most(at[lane], end));
+                let way = slope[lane] * length[lane];
+                let (end, start) = (at[lane] + way, at[lane] - way * back);
+                let ends = (least(start, end), most(start, end));
                 register.set(lane, Stretch::new(ends, (slope[lane], slope[lane])));
             }
         }

@@ -3,8 +3,8 @@
 use crate::hash::{hash, unit};
 use crate::program::tests::{fig_5_6, noise_zoo, planet, scaled, values, zoo};
 use crate::{
-    BATCH, Graph, Interval, NodeId, Op, Outlook, Points, Program, Region, Scratch, SimdLevel,
-    Surroundings,
+    BATCH, Graph, Interval, NodeId, Op, Outlook, Points, Program, Region, Scratch, Sides,
+    SimdLevel, Surroundings,
 };
 
 /// Pairs of places in a region: near and far, with the footprints of a camera at `eye`.
@@ -194,14 +194,17 @@ struct Asked<'a> {
     points: Points<'a>,
     direction: [&'a [f64]; 3],
     guess: &'a [f64],
+    bend: &'a [f64],
     limit: &'a [f64],
     offset: &'a [f64],
     slope: &'a [f64],
+    sides: Sides,
 }
 
-/// How far ahead the program is above what is asked, batch by batch.
-fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
-    let mut ahead = asked.guess.to_vec();
+/// How far ahead the program is above what is asked, and how far behind, batch by batch.
+fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> [Vec<f64>; 2] {
+    let mut ahead = vec![f64::NAN; asked.guess.len()];
+    let mut behind = ahead.clone();
     let mut scratch = Scratch::new();
     let Points {
         x,
@@ -217,6 +220,8 @@ fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
         let [x, y, z, footprint, time] = [x, y, z, footprint, time].map(part);
         let [dx, dy, dz] = asked.direction.map(part);
         let [offset, slope, limit] = [asked.offset, asked.slope, asked.limit].map(part);
+        let (most, mut bend) = (part(asked.guess), part(asked.bend));
+        let least = vec![1e-9; n];
         let points = Points {
             x: &x,
             y: &y,
@@ -228,19 +233,29 @@ fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> Vec<f64> {
             offset: &offset,
             slope: &slope,
             limit: &limit,
+            least: &least,
+            most: &most,
             footprint_slope: PIXEL_ANGLE,
+            sides: asked.sides,
         };
         let (mut value, mut along) = (vec![0.0; n], vec![0.0; n]);
-        let out = [&mut value[..], &mut along, &mut ahead[batch]];
+        let (ahead, behind) = (&mut ahead[batch.clone()], &mut behind[batch]);
+        let out = [&mut value[..], &mut along, ahead, behind, &mut bend];
         program.evaluate_ahead(level, &points, [&dx, &dy, &dz], outlook, &mut scratch, out);
     }
-    ahead
+    [ahead, behind]
 }
 
 impl Pairs {
-    /// Checks stretches ahead of the first place of every pair, towards the second: nowhere on them may the field
-    /// fall below the value that they are asked about.
+    /// Checks stretches ahead of the first place of every pair, towards the second, and behind it: nowhere on them may the
+    /// field fall below the value that they are asked about.
     fn check_ahead(&self, name: &str, program: &Program, f: &[f64]) {
+        for sides in [Sides::Ahead, Sides::Both] {
+            self.check_sides(name, program, f, sides);
+        }
+    }
+
+    fn check_sides(&self, name: &str, program: &Program, f: &[f64], sides: Sides) {
         let Some(taylor) = program.taylor(&self.around) else {
             return;
         };
@@ -260,6 +275,8 @@ impl Pairs {
         let number = |i: usize, k: u32| unit(hash(&[7, u32::try_from(i).unwrap(), k]));
         let each = |of: &dyn Fn(usize) -> f64| (0..n).map(of).collect::<Vec<_>>();
         let guess = each(&|i| distance(i) * libm::exp2(6.0 * number(i, 0) - 3.0));
+        // Of every second stretch the length is guessed.
+        let bend = each(&|i| (i % 2) as f64 * libm::exp2(20.0 * number(i, 3) - 10.0));
         let limit = each(&|i| guess[i] * libm::exp2(4.0 * number(i, 2)));
         let floor = each(&|i| f[i] - libm::exp2(20.0 * number(i, 1) - 16.0));
         let offset = each(&|i| taylor.offset + floor[i]);
@@ -275,51 +292,59 @@ impl Pairs {
             },
             direction: [dx, dy, dz],
             guess: &guess,
+            bend: &bend,
             limit: &limit,
             offset: &offset,
             slope: &vec![taylor.slope; n],
+            sides,
         };
-        let ahead = clear(program, SimdLevel::best(), &asked);
+        let [ahead, behind] = clear(program, SimdLevel::best(), &asked);
         for level in SimdLevel::all_available() {
             let bits = |all: &[f64]| all.iter().map(|a| a.to_bits()).collect::<Vec<_>>();
-            let same = bits(&clear(program, level, &asked)) == bits(&ahead);
+            let [forth, back] = clear(program, level, &asked);
+            let same = bits(&forth) == bits(&ahead) && bits(&back) == bits(&behind);
             assert!(same, "{name} at {level}");
         }
-        let mut outside = vec![false; n];
-        for step in 1..=16 {
-            let mut columns: [Vec<f64>; 5] = Default::default();
-            for i in 0..n {
-                let place = at(i, ahead[i] * f64::from(step) / 16.0, &direction);
-                outside[i] |= !inside(self.around.region, place);
-                let row = [
-                    place[0],
-                    place[1],
-                    place[2],
-                    footprint(self.eye, place),
-                    time[i],
-                ];
-                for (column, value) in columns.iter_mut().zip(row) {
-                    column.push(value);
+        if sides == Sides::Ahead {
+            assert!(behind.iter().all(|back| *back == 0.0), "{name}");
+        }
+        for (seen, sign) in [(&ahead, 1.0), (&behind, -1.0)] {
+            let mut outside = vec![false; n];
+            for step in 1..=16 {
+                let mut columns: [Vec<f64>; 5] = Default::default();
+                for i in 0..n {
+                    let place = at(i, sign * seen[i] * f64::from(step) / 16.0, &direction);
+                    outside[i] |= !inside(self.around.region, place);
+                    let row = [
+                        place[0],
+                        place[1],
+                        place[2],
+                        footprint(self.eye, place),
+                        time[i],
+                    ];
+                    for (column, value) in columns.iter_mut().zip(row) {
+                        column.push(value);
+                    }
                 }
-            }
-            let [x, y, z, footprint, time] = &columns;
-            let points = Points {
-                x,
-                y,
-                z,
-                footprint,
-                time,
-            };
-            let there = values(program, SimdLevel::best(), &points);
-            for i in 0..n {
-                assert!(
-                    outside[i] || ahead[i] == 0.0 || there[i] > floor[i],
-                    "{name}: {} is below {} after {} of {}",
-                    there[i],
-                    floor[i],
-                    f64::from(step) / 16.0,
-                    ahead[i]
-                );
+                let [x, y, z, footprint, time] = &columns;
+                let points = Points {
+                    x,
+                    y,
+                    z,
+                    footprint,
+                    time,
+                };
+                let there = values(program, SimdLevel::best(), &points);
+                for i in 0..n {
+                    assert!(
+                        outside[i] || seen[i] == 0.0 || there[i] > floor[i],
+                        "{name}: {} is below {} after {} of {}",
+                        there[i],
+                        floor[i],
+                        sign * f64::from(step) / 16.0,
+                        seen[i]
+                    );
+                }
             }
         }
         // Values that are finite and asked about something below them see some way.

@@ -349,6 +349,35 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
 }
 
 #[test]
+fn packets_of_any_size_and_order_meet_what_their_rays_meet_alone() {
+    let scenes = [("plane", scenes::plane()), ("crags", scenes::crags())];
+    for (name, scene) in scenes {
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let rays = |surface: &Surface| rays(surface, &view, 300);
+        let best = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let all = rays(&best);
+        let alone = all.chunks(1).map(|ray| trace(&best, Goal::Distance, ray));
+        let alone: Vec<_> = alone.flat_map(|(hits, _)| hits).collect();
+        assert!(alone.iter().any(|hit| *hit != Hit::None), "{name}");
+        for level in SimdLevel::all_available() {
+            let surface = Surface::new(&scene, &view, level).unwrap();
+            for size in [5, 37, 129, all.len()] {
+                // Every 7th ray, round and round: neighbours are strangers.
+                for stride in [1, 7] {
+                    let order: Vec<_> = (0..all.len()).map(|i| i * stride % all.len()).collect();
+                    let mixed: Vec<_> = order.iter().map(|&i| all[i]).collect();
+                    let packets = mixed.chunks(size);
+                    let hits = packets.flat_map(|rays| trace(&surface, Goal::Distance, rays).0);
+                    for (hit, &i) in hits.zip(&order) {
+                        assert_eq!(hit, alone[i], "{name} at {level}, {size} together");
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[test]
 fn where_the_ground_is_clear_the_field_is_positive() {
     let mut scene = scenes::ridges();
     scene.film.resolution.width = 400;

@@ -161,8 +161,11 @@ fn no_technique_of_the_tracer_changes_a_pixel() {
             is_of_use |= more.evaluations > counts.evaluations
                 || more.noise_evaluations > counts.noise_evaluations;
         }
-        // Of no scene here: their shutters are as short as their images are small.
-        let is_left_out = technique == Technique::Slices;
+        // Of no scene here: their shutters are as short as their images are small, whose rays look far between points.
+        let is_left_out = matches!(
+            technique,
+            Technique::Slices | Technique::Hindsight | Technique::Bends
+        );
         assert!(
             is_of_use || is_left_out,
             "{} gains nothing",

@@ -1,6 +1,6 @@
 //! Places along many rays, and the field's values there: structure of arrays.
 
-use field::{BATCH, Outlook, Points, Scratch};
+use field::{BATCH, Outlook, Points, Scratch, Sides};
 use glam::DVec3;
 
 use super::surface::Surface;
@@ -163,15 +163,15 @@ impl Batch {
         self.slope[..n].copy_from_slice(&slope[..n]);
     }
 
-    /// Evaluates the field at the places, its derivative along the paths, and how far ahead it is positive,
-    /// from a first guess in `ahead`. The field's errors and how far it is wanted are in the other rows.
+    /// Evaluates the field at the places, its derivative along the paths, and how far ahead and behind it is positive, as
+    /// far as `bend` lets it look. The field's errors, how far it is wanted and how far to look are in the other rows.
     pub(crate) fn evaluate_ahead(
         &mut self,
         surface: &Surface,
         n: usize,
         paths: &Paths,
-        [offset, slope, limit]: [&Lanes; 3],
-        ahead: &mut Lanes,
+        (sides, [offset, slope, limit, least, most]): (Sides, [&Lanes; 5]),
+        [ahead, behind, bend]: [&mut Lanes; 3],
         scratch: &mut Scratch,
     ) {
         let (mut value, mut derivative) = ([0.0; BATCH], [0.0; BATCH]);
@@ -180,7 +180,10 @@ impl Batch {
             offset: &offset[..n],
             slope: &slope[..n],
             limit: &limit[..n],
+            least: &least[..n],
+            most: &most[..n],
             footprint_slope: surface.footprint.angle,
+            sides,
         };
         surface.program.evaluate_ahead(
             surface.level,
@@ -188,7 +191,13 @@ impl Batch {
             [&x[..n], &y[..n], &z[..n]],
             outlook,
             scratch,
-            [&mut value[..n], &mut derivative[..n], &mut ahead[..n]],
+            [
+                &mut value[..n],
+                &mut derivative[..n],
+                &mut ahead[..n],
+                &mut behind[..n],
+                &mut bend[..n],
+            ],
         );
         self.value[..n].copy_from_slice(&value[..n]);
         self.slope[..n].copy_from_slice(&derivative[..n]);

@@ -42,6 +42,9 @@ const DEPTH: usize = 4;
 /// Most levels: the last reaches half a million times as far as the first.
 const LEVELS_MAX: usize = 20;
 
+/// Rays that are led side by side.
+const SIDE_BY_SIDE: usize = 32;
+
 /// Most tries along one ray.
 const TRIES_MAX: u32 = 512;
 
@@ -63,7 +66,7 @@ const ERROR_MAX: f64 = 0.25;
 /// A linear function that is nowhere above the field over a cell.
 #[derive(Clone, Copy, Debug)]
 struct Below {
-    /// In the cell's middle, half as high as the bound.
+    /// At the eye, as if the function went on there.
     value: f64,
     /// Per metre.
     slope: DVec3,
@@ -73,6 +76,10 @@ struct Below {
 #[derive(Debug)]
 struct Level {
     side: f64,
+    /// One over it.
+    inverse: f64,
+    /// How far from the eye it serves rays, by the larger of x and y: not as far as its cells go, for rounding.
+    reach: f64,
     cells: OnceLock<Box<[OnceLock<Below>]>>,
 }
 
@@ -86,8 +93,6 @@ pub(crate) struct Ground {
     heights: Interval,
     /// Cells from the eye to the edge of a level.
     half: usize,
-    /// How far the first level reaches, by the larger of x and y.
-    reach: f64,
     levels: Vec<Level>,
 }
 
@@ -141,6 +146,8 @@ impl Ground {
         while levels.len() < LEVELS_MAX {
             levels.push(Level {
                 side: far / half,
+                inverse: half / far,
+                reach: (1.0 - 1.0 / HALF[1]) * far,
                 cells: OnceLock::new(),
             });
             if far > farthest {
@@ -159,7 +166,6 @@ impl Ground {
             footprint: site.footprint,
             heights: Interval::new(low, high),
             half: half as usize,
-            reach,
             levels,
         };
         let column = ground.column(ground.levels[0].side, [0.5, 0.5]);
@@ -175,59 +181,82 @@ impl Ground {
         spans: &mut [Span],
         cancel: &AtomicBool,
     ) -> Result<(), Cancelled> {
-        for span in spans {
+        let mut waiting = spans.iter_mut();
+        let mut leads: Vec<Lead<'_>> = Vec::with_capacity(SIDE_BY_SIDE);
+        loop {
+            while leads.len() < SIDE_BY_SIDE {
+                let Some(span) = waiting.next() else {
+                    break;
+                };
+                leads.push(Lead {
+                    way: Way::new(&rays[span.ray], self.eye, span.end),
+                    level: self.levels.len() - 1,
+                    finest: 0,
+                    was_clear: true,
+                    tries: 0,
+                    span,
+                });
+            }
+            if leads.is_empty() {
+                return Ok(());
+            }
             if cancel.load(Ordering::Relaxed) {
                 return Err(Cancelled);
             }
-            span.clear = self.clear(field, &rays[span.ray], span.clear, span.end);
+            // A try waits for cells and divisions; those of other rays fill the time.
+            for i in (0..leads.len()).rev() {
+                if !self.goes_on(field, &mut leads[i]) {
+                    leads.swap_remove(i);
+                }
+            }
         }
-        Ok(())
     }
 
-    /// How far a ray meets nothing, if it meets nothing before `t`: at most `end`.
-    fn clear(&self, field: &Program, ray: &Ray, mut t: f64, end: f64) -> f64 {
-        let way = Way::new(ray, self.eye, end);
+    /// One try of a ray, which meets nothing before its span's start; says whether to try again.
+    #[inline]
+    fn goes_on(&self, field: &Program, lead: &mut Lead<'_>) -> bool {
+        let Lead { way, span, .. } = lead;
         let last = self.levels.len() - 1;
-        let mut level = last;
-        let mut finest = 0;
-        for _ in 0..TRIES_MAX {
-            let place = way.at(t);
-            let far = larger(place.x.abs(), place.y.abs());
-            while far
-                >= (1.0 - 1.0 / HALF[1]) * self.reach * self.levels[finest].side
-                    / self.levels[0].side
-            {
-                if finest == last {
-                    return t;
-                }
-                finest += 1;
+        let place = way.at(span.clear);
+        let far = larger(place.x.abs(), place.y.abs());
+        while far >= self.levels[lead.finest].reach {
+            if lead.finest == last {
+                return false;
             }
-            // Rays come nearer, too, but then what is coarser there serves them.
-            level = level.clamp(finest, last.min(finest + DEPTH - 1));
-            let Some(over) = self.over(field, level, &way, t) else {
-                return t;
-            };
-            if over.exit <= t {
-                return t;
-            }
-            t = over.clear;
-            if t >= end {
-                return end;
-            }
-            if over.clear == over.exit {
-                level += 1;
-            } else if level == finest {
-                return t;
-            } else {
-                level -= 1;
-            }
+            lead.finest += 1;
         }
-        t
+        // Rays come nearer, too, but then what is coarser there serves them.
+        let coarsest = last.min(lead.finest + DEPTH - 1);
+        lead.level = lead.level.clamp(lead.finest, coarsest);
+        let Some(over) = self.over(field, lead.level, way, span.clear) else {
+            return false;
+        };
+        if over.exit <= span.clear {
+            return false;
+        }
+        let is_clear = over.clear == over.exit;
+        let is_done = over.clear >= span.end || (!is_clear && lead.level == lead.finest);
+        span.clear = over.clear;
+        lead.level = if !is_clear {
+            lead.level.saturating_sub(1)
+        } else if lead.was_clear {
+            lead.level + 1
+        } else {
+            lead.level
+        };
+        lead.was_clear = is_clear;
+        lead.tries += 1;
+        !is_done && lead.tries < TRIES_MAX
     }
 
     /// What the cell that a ray goes over from `t` on says; `None` where the level has none.
     fn over(&self, field: &Program, level: usize, way: &Way, t: f64) -> Option<Over> {
-        let Level { side, cells } = &self.levels[level];
+        let Level {
+            side,
+            inverse,
+            cells,
+            ..
+        } = &self.levels[level];
         let count = 2 * self.half;
         let cells = cells.get_or_init(|| {
             let mut cells = Vec::new();
@@ -235,7 +264,7 @@ impl Ground {
             cells.into_boxed_slice()
         });
         let ahead = way.at(t + NUDGE * side * way.per_metre);
-        let corner = [(ahead.x / side).floor(), (ahead.y / side).floor()];
+        let corner = [floor(ahead.x * inverse), floor(ahead.y * inverse)];
         let [column, row] = corner.map(|cell| cell + self.half as f64);
         if !(column >= 0.0 && row >= 0.0 && column < count as f64 && row < count as f64) {
             return None;
@@ -246,12 +275,12 @@ impl Ground {
             reason = "whole and in range"
         )]
         let index = row as usize * count + column as usize;
-        let middle = corner.map(|cell| cell + 0.5);
-        let below = cells[index].get_or_init(|| self.below(field, *side, middle));
+        let below = cells[index].get_or_init(|| self.below(field, *side, corner));
         let exit = way.leaves(*side, corner);
-        let centre = self.column(*side, middle).centre - self.eye;
-        let at = |t: f64| below.value + below.slope.dot(way.at(t) - centre);
-        let (near, far) = (at(t), at(exit));
+        // Along the ray it is a line.
+        let first = below.value + below.slope.dot(way.origin);
+        let rate = below.slope.dot(way.direction);
+        let (near, far) = (first + rate * t, first + rate * exit);
         // Where it is not positive all the way, as far as it is.
         let clear = if near > 0.0 && far > 0.0 {
             exit
@@ -264,14 +293,14 @@ impl Ground {
     }
 
     /// The function below the field over a cell.
-    fn below(&self, field: &Program, side: f64, middle: [f64; 2]) -> Below {
-        let Column { cell, half, .. } = self.column(side, middle);
+    fn below(&self, field: &Program, side: f64, corner: [f64; 2]) -> Below {
+        let Column { cell, half, centre } = self.column(side, corner.map(|cell| cell + 0.5));
         let form = field.over_cell(&cell);
         let slope = DVec3::from(form.along) / half;
         let size = form.centre.abs() + form.radius();
         let rounding = size * CAUTION + slope.abs().element_sum() * self.size() * ROUNDING;
         Below {
-            value: form.centre - form.error - rounding,
+            value: form.centre - form.error - rounding - slope.dot(centre - self.eye),
             slope,
         }
     }
@@ -303,6 +332,19 @@ impl Ground {
     }
 }
 
+/// A ray that is led.
+struct Lead<'a> {
+    span: &'a mut Span,
+    way: Way,
+    /// The level to try next.
+    level: usize,
+    /// The finest level that reaches where the ray is.
+    finest: usize,
+    /// Whether its last cell was clear.
+    was_clear: bool,
+    tries: u32,
+}
+
 /// A column above a cell, in world metres.
 struct Column {
     cell: Cell,
@@ -323,6 +365,8 @@ struct Way {
     origin: DVec3,
     direction: DVec3,
     end: f64,
+    /// One over x and y of the direction.
+    inverse: [f64; 2],
     /// By how much t grows for each metre along the larger of x and y.
     per_metre: f64,
 }
@@ -335,6 +379,7 @@ impl Way {
             origin: ray.origin - eye,
             direction,
             end,
+            inverse: [1.0 / direction.x, 1.0 / direction.y],
             per_metre: 1.0 / larger(across, f64::MIN_POSITIVE),
         }
     }
@@ -347,16 +392,28 @@ impl Way {
     fn leaves(&self, side: f64, corner: [f64; 2]) -> f64 {
         let mut exit = self.end;
         for (axis, low) in corner.into_iter().enumerate() {
-            let (origin, direction) = (self.origin[axis], self.direction[axis]);
+            let direction = self.direction[axis];
             if direction == 0.0 {
                 continue;
             }
             let edge = if direction > 0.0 { low + 1.0 } else { low };
-            let t = (edge * side - origin) / direction;
+            let t = (edge * side - self.origin[axis]) * self.inverse[axis];
             exit = if t < exit { t } else { exit };
         }
         exit
     }
+}
+
+/// The whole number below one that cells are counted with; others are beyond all cells.
+///
+/// Without an instruction of its own, [`f64::floor`] is a call that takes as long as a cell's function.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "what is out of range stays beyond all cells"
+)]
+fn floor(a: f64) -> f64 {
+    let whole = f64::from(a as i32);
+    if whole > a { whole - 1.0 } else { whole }
 }
 
 fn larger(a: f64, b: f64) -> f64 {

@@ -11,7 +11,7 @@ mod rows;
 
 use core::sync::atomic::Ordering;
 
-use field::{BATCH, Scratch};
+use field::{BATCH, Scratch, Sides};
 use rows::Rows;
 
 use super::batch::{Batch, Paths};
@@ -21,7 +21,7 @@ use super::bundle::Span;
 use super::grid::Steps;
 use super::means::Means;
 use super::polish::Found;
-use super::surface::Surface;
+use super::surface::{Looks, Surface};
 use super::techniques::Technique;
 use super::tracer::{Goal, Hit, Ray, Results, Wanted};
 use crate::error::Cancelled;
@@ -65,6 +65,11 @@ impl Search {
         }: Results<'_>,
         mut found: impl FnMut(Found, Results<'_>),
     ) -> Result<(), Cancelled> {
+        // Rays towards the sun begin at the surface and leave it: they gain nothing by looking back.
+        let looks = match goal {
+            Goal::Distance => surface.looks,
+            Goal::Occlusion => Looks::default(),
+        };
         let mut waiting = spans.iter();
         loop {
             while self.rays.len() < BATCH {
@@ -81,7 +86,7 @@ impl Search {
                 self.rays.clear();
                 return Err(Cancelled);
             }
-            self.step(surface, n, scratch);
+            self.step(surface, looks, n, scratch);
             counts.evaluations += n as u64;
             for i in (0..n).rev() {
                 let rows = &self.rows;
@@ -144,6 +149,7 @@ impl Search {
         rows.outside_value[lane] = 0.0;
         rows.count[lane] = 0.0;
         rows.seen[lane] = 0.0;
+        rows.bend[lane] = 0.0;
         rows.steps.set(lane, steps);
         self.rays.push(Lane {
             ray: span.ray,
@@ -169,6 +175,7 @@ impl Search {
             &mut rows.outside_value,
             &mut rows.count,
             &mut rows.seen,
+            &mut rows.bend,
         ] {
             row[i] = row[last];
         }
@@ -176,7 +183,7 @@ impl Search {
     }
 
     /// One evaluation of every lane, and what follows from it.
-    fn step(&mut self, surface: &Surface, n: usize, scratch: &mut Scratch) {
+    fn step(&mut self, surface: &Surface, looks: Looks, n: usize, scratch: &mut Scratch) {
         let Self {
             paths, batch, rows, ..
         } = self;
@@ -190,9 +197,21 @@ impl Search {
             rows.reach[i] = clearance.reach;
         }
         if surface.means == Means::Stretches {
-            rows.guess(n);
-            let outlook = [&rows.error, &rows.slope_error, &rows.limit];
-            batch.evaluate_ahead(surface, n, paths, outlook, &mut rows.seen, scratch);
+            rows.look(n, looks.bends);
+            let outlook = [
+                &rows.error,
+                &rows.slope_error,
+                &rows.limit,
+                &rows.least,
+                &rows.most,
+            ];
+            let sides = if looks.back {
+                Sides::Both
+            } else {
+                Sides::Ahead
+            };
+            let seen = [&mut rows.seen, &mut rows.looked_back, &mut rows.bend];
+            batch.evaluate_ahead(surface, n, paths, (sides, outlook), seen, scratch);
         } else if surface.means == Means::Tangents {
             batch.evaluate_along(surface, n, paths, scratch);
         } else {

@@ -51,12 +51,23 @@ pub(crate) struct Surface {
     pub(crate) ground: Option<Arc<Ground>>,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
+    /// How camera rays look along themselves.
+    pub(crate) looks: Looks,
     /// Most evaluations along one ray.
     pub(crate) steps_max: f64,
     /// Whether its program has been simplified, so that values outside are not those of the field.
     pub(crate) is_partial: bool,
     /// A technique that is left out.
     pub(crate) without: Option<Technique>,
+}
+
+/// How rays look along themselves where the field's ranges say how far it is clear.
+#[derive(Clone, Copy, Default, PartialEq, Eq, Debug)]
+pub(crate) struct Looks {
+    /// Whether they look behind, too.
+    pub(crate) back: bool,
+    /// Whether how far they look follows from how the field bends.
+    pub(crate) bends: bool,
 }
 
 impl Surface {
@@ -135,6 +146,7 @@ impl Surface {
             moves: program.moves(),
             ground: None,
             means: Means::Values,
+            looks: Looks::default(),
             steps_max: STEPS_MAX,
             is_partial: false,
             without,
@@ -167,7 +179,7 @@ impl Surface {
         if means.is_some() && ground.is_none() {
             return Ok(surface);
         }
-        let (cheapest, cost) = means::cheapest(&surface, view, &allowed);
+        let (cheapest, mut cost) = means::cheapest(&surface, view, &allowed);
         surface.means = cheapest;
         if ground.is_some() {
             let led = Self {
@@ -180,6 +192,27 @@ impl Surface {
                     means: cheapest,
                     ..led
                 };
+                cost = led_cost;
+            }
+        }
+        if surface.means == Means::Stretches && !surface.walks() {
+            let (back, bends) = (is_used(Technique::Hindsight), is_used(Technique::Bends));
+            for looks in [
+                Looks { back, bends: false },
+                Looks { back: false, bends },
+                Looks { back, bends },
+            ] {
+                if looks == surface.looks {
+                    continue;
+                }
+                let other = Self {
+                    looks,
+                    ..surface.clone()
+                };
+                let (_, other_cost) = means::cheapest(&other, view, &[Means::Stretches]);
+                if other_cost < cost {
+                    (surface, cost) = (other, other_cost);
+                }
             }
         }
         Ok(surface)

@@ -11,6 +11,10 @@ pub enum Technique {
     Tangents,
     /// The range of that derivative on the stretch ahead proves one, where that is worth its cost.
     Stretches,
+    /// That range is of the stretch behind, too, and proves both.
+    Hindsight,
+    /// How far ahead that is follows from how far it spread the last time.
+    Bends,
     /// Steps reach beyond what is proven, to where the next one will meet them.
     Foresight,
     /// What of the field is a height or a radius is followed exactly, and only the rest is bounded.
@@ -31,10 +35,12 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 13] = [
         Self::Bundles,
         Self::Tangents,
         Self::Stretches,
+        Self::Hindsight,
+        Self::Bends,
         Self::Foresight,
         Self::Growth,
         Self::Levels,
@@ -51,6 +57,8 @@ impl Technique {
             Self::Bundles => "bundles",
             Self::Tangents => "tangents",
             Self::Stretches => "stretches ahead",
+            Self::Hindsight => "hindsight",
+            Self::Bends => "seen bends",
             Self::Foresight => "foresight",
             Self::Growth => "known growth",
             Self::Levels => "levels by value",

@@ -24,6 +24,8 @@ const DEEP: f64 = 1e9;
 #[derive(Debug)]
 pub(super) struct Octaves {
     pub(super) length: Row,
+    /// How far stretches reach behind their places, as a share of `length`.
+    pub(super) back: f64,
     /// The greatest speed of the cascade's argument, and how far its velocity may turn.
     speed: Row,
     turn: Row,
@@ -66,6 +68,7 @@ impl Octaves {
     pub(super) fn new() -> Self {
         Self {
             length: [0.0; WIDTH],
+            back: 0.0,
             speed: [0.0; WIDTH],
             turn: [0.0; WIDTH],
             shallow: [0.0; WIDTH],
@@ -91,6 +94,8 @@ impl Octaves {
     pub(super) fn noise(&mut self, sample: &Sample<1>, start: usize, frequency: f64) {
         let [slopes] = &sample.gradient;
         let (slopes, values) = (&slopes[start..][..WIDTH], &sample.noise[start..][..WIDTH]);
+        // Not read from memory in the loop, which writes there: it would not become vectors.
+        let back = self.back;
         for i in 0..WIDTH {
             let speed = self.speed[i] * frequency;
             let steepest = noise::SLOPE * speed;
@@ -101,8 +106,10 @@ impl Octaves {
             let fall = most(slope - room, -steepest);
             let rise = least(slope + room, steepest);
             let value = f64::from(values[i]);
-            let down = least(fall, 0.0) * self.length[i] - noise::ROUNDING;
-            let up = most(rise, 0.0) * self.length[i] + noise::ROUNDING;
+            // Behind the place a rise leads down.
+            let (descent, ascent) = (most(-fall, back * rise), most(rise, -back * fall));
+            let down = -most(descent, 0.0) * self.length[i] - noise::ROUNDING;
+            let up = most(ascent, 0.0) * self.length[i] + noise::ROUNDING;
             self.noise.low[i] = most(value + down, -noise::RANGE);
             self.noise.high[i] = least(value + up, noise::RANGE);
             self.noise.fall[i] = fall;

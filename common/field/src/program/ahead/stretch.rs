@@ -163,7 +163,7 @@ pub(crate) fn steepness(parts: [Stretch; 3]) -> f64 {
     (a * a + b * b + c * c).sqrt()
 }
 
-/// How far a place's velocity can be from what it was at the stretch's start.
+/// How far a place's velocity can be from what it is at the place that the stretch is around.
 #[inline(always)]
 pub(crate) fn turn(parts: [Stretch; 3]) -> f64 {
     let [a, b, c] = parts.map(|part| part.rise - part.fall);

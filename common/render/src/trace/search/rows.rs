@@ -17,9 +17,9 @@ const FORESIGHT: f64 = 0.9;
 const NEARLY: f64 = 0.6;
 
 /// How many points of its grid a ray looks ahead at first.
-const FIRST: f64 = 64.0;
+const FIRST: f64 = 16.0;
 
-/// By how much a ray looks farther ahead than it could the last time.
+/// By how much a ray looks farther ahead than it could the last time, where that does not follow from the field.
 const FARTHER: f64 = 1.3;
 
 /// Lanes are computed in multiples of this, so that vector loops have no scalar rest.
@@ -63,8 +63,15 @@ pub(super) struct Rows {
     pub(super) slope_error: Lanes,
     /// How far ahead it is worth looking.
     pub(super) limit: Lanes,
-    /// How far ahead the field is proven to be positive by its own ranges, and the guess before that.
+    /// How far to look at least and at most.
+    pub(super) least: Lanes,
+    pub(super) most: Lanes,
+    /// How fast the derivative's range was seen to spread, 0 before the first look.
+    pub(super) bend: Lanes,
+    /// How far ahead the field is proven to be positive by its own ranges.
     pub(super) seen: Lanes,
+    /// How far behind the point it is proven to be positive so.
+    pub(super) looked_back: Lanes,
     /// How far ahead and back of the point no root can be.
     ahead: Lanes,
     behind: Lanes,
@@ -96,7 +103,11 @@ impl Default for Rows {
             error: [0.0; BATCH],
             slope_error: [0.0; BATCH],
             limit: [0.0; BATCH],
+            least: [0.0; BATCH],
+            most: [0.0; BATCH],
+            bend: [0.0; BATCH],
             seen: [0.0; BATCH],
+            looked_back: [0.0; BATCH],
             ahead: [0.0; BATCH],
             behind: [0.0; BATCH],
         }
@@ -113,26 +124,31 @@ impl Rows {
         }
     }
 
-    /// How far ahead to look: a little farther than the last time, but no nearer than the next points; and past
-    /// the ray's end there is nothing to be seen.
-    pub(super) fn guess(&mut self, n: usize) {
+    /// How far to look: past the ray's end there is nothing to be seen. If the lanes' `bends` are used, between the next
+    /// points and as far as bounds hold; else a little farther than the last time.
+    pub(super) fn look(&mut self, n: usize, bends: bool) {
         for i in 0..n {
             let (at, end) = (self.at[i], self.end[i]);
             let steps = self.steps.at(i);
             let gap = steps.after(at) - at;
             self.limit[i] = steps.after(end) - at;
-            let least = if self.count[i] > 0.0 {
-                2.0 * gap
-            } else {
+            let least = 2.0 * gap;
+            let wanted = if self.count[i] == 0.0 {
                 FIRST * gap
+            } else if bends {
+                self.reach[i]
+            } else {
+                let guess = FARTHER * self.seen[i];
+                if guess > least { guess } else { least }
             };
-            let guess = FARTHER * self.seen[i];
-            let guess = if guess > least { guess } else { least };
-            self.seen[i] = if guess < self.reach[i] {
-                guess
+            let most = if wanted < self.reach[i] {
+                wanted
             } else {
                 self.reach[i]
             };
+            self.most[i] = most;
+            self.least[i] = if least < most { least } else { most };
+            self.bend[i] = if bends { self.bend[i] } else { 0.0 };
         }
     }
 
@@ -257,9 +273,11 @@ impl Rows {
                 self.reach[i]
             }
         };
-        // What has been seen ahead needs no table, and holds as far as it goes.
-        let ahead = most(cut(ahead, tangent_ahead), self.seen[i]);
-        (ahead, cut(behind, tangent_behind))
+        // What has been seen needs no table, and holds as far as it goes.
+        (
+            most(cut(ahead, tangent_ahead), self.seen[i]),
+            most(cut(behind, tangent_behind), self.looked_back[i]),
+        )
     }
 }
 
