@@ -262,8 +262,9 @@ impl Shell {
                 {
                     job.foretold = None;
                 }
-                if waiting.command == Command::Remove && waiting.frames == Frames::Go {
-                    self.removing.insert(id);
+                if waiting.command == Command::Remove {
+                    let before = waiting.before.clone();
+                    self.removing.insert(id, (waiting.frames, before));
                 }
                 let goes_on = self
                     .sched
@@ -285,10 +286,8 @@ impl Shell {
         };
         self.eras.retain(|image, _| image.job != id);
         self.storage.record(Entry::Forgotten { job: id }, None);
-        let frames = match self.removing.remove(&id) {
-            true => Frames::Go,
-            false => Frames::Stay,
-        };
+        let removed = self.removing.remove(&id);
+        let frames = removed.map_or(Frames::Stay, |(frames, _)| frames);
         self.storage.forget(job.folders().clone(), frames);
     }
 
@@ -379,11 +378,9 @@ impl Shell {
         }
         self.say(id, format!("the job is {words}"));
         // Of a job that is removed before it is over the scheduler says nothing any more.
-        let removed = self.commanding.front().map(|waiting| &waiting.before);
+        let removed = self.removing.get(&id).map(|(_, before)| before);
         let summary = self.summary(id);
-        let summary = summary
-            .as_ref()
-            .or(removed.filter(|before| before.job == id.0));
+        let summary = summary.as_ref().or(removed);
         if let (Some(summary), Some(job)) = (summary, self.jobs.get(id)) {
             self.hook.job_ended(|| about_ended(summary, outcome, job));
         }

@@ -15,7 +15,7 @@ mod queries;
 mod recall;
 mod views;
 
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -62,8 +62,8 @@ pub(crate) struct Shell {
     arriving: Option<Box<NewJob>>,
     /// Commands that were fed and are not answered, in order.
     commanding: VecDeque<Commanding>,
-    /// Jobs that leave no frames when they are forgotten.
-    removing: BTreeSet<JobId>,
+    /// Jobs that users remove, until they are forgotten: what becomes of their frames, and what they were before.
+    removing: BTreeMap<JobId, (Frames, proto::JobSummary)>,
     hook: Hook,
     held: Held,
     /// Eras of images that are not in their first.
@@ -121,7 +121,7 @@ impl Shell {
             submitting: VecDeque::new(),
             arriving: None,
             commanding: VecDeque::new(),
-            removing: BTreeSet::new(),
+            removing: BTreeMap::new(),
             held: Held::default(),
             eras: BTreeMap::new(),
             troubles: BTreeMap::new(),
