@@ -95,6 +95,8 @@ mod tests {
     use std::fs;
     use std::os::unix::fs::PermissionsExt as _;
 
+    use rustix::fs::{CWD, FileType, Mode, mknodat};
+
     use super::*;
 
     /// Whether a process runs; one that has ended and that nobody waited for does not.
@@ -107,25 +109,24 @@ mod tests {
     async fn what_the_program_started_is_killed_with_it() {
         let folder = tempfile::tempdir().unwrap();
         let (program, started) = (folder.path().join("hook"), folder.path().join("started"));
+        // Reading it waits until the program has said what it started.
+        let mode = Mode::RUSR | Mode::WUSR;
+        mknodat(CWD, &started, FileType::Fifo, mode, 0).unwrap();
         let script = format!(
-            "#!/bin/sh\nsleep 1000 & echo $! > {0}.new\nmv {0}.new {0}\nwait\n",
+            "#!/bin/sh\nsleep 1000 &\necho $! > {}\nwait\n",
             started.display()
         );
         fs::write(&program, script).unwrap();
         fs::set_permissions(&program, fs::Permissions::from_mode(0o700)).unwrap();
         let mut running = Box::pin(run(&program, About::new(), Duration::MAX));
-        let child = loop {
-            tokio::select! {
-                () = &mut running => panic!("it ended by itself"),
-                () = tokio::time::sleep(Duration::from_millis(5)) => {}
-            }
-            if let Ok(child) = fs::read_to_string(&started) {
-                break child.trim().to_owned();
-            }
+        let child = tokio::select! {
+            () = &mut running => panic!("it ended by itself"),
+            child = tokio::fs::read_to_string(&started) => child.unwrap(),
         };
-        assert!(runs(&child));
+        let child = child.trim();
+        assert!(runs(child));
         drop(running);
-        while runs(&child) {
+        while runs(child) {
             tokio::task::yield_now().await;
         }
     }
