@@ -1,21 +1,21 @@
 //! OpenEXR: one part, every channel of the film, tiles of a strip's height, ZIP.
 //!
-//! Tiles are written row by row from strips, through the `exr` crate's block interface. Compressing them is most of
+//! Tiles are written row by row from strips, through the `exr` crate's chunk interface. Compressing them is most of
 //! the work, and can be shared by threads; the bytes are the same.
 
 use std::collections::HashMap;
 use std::io::BufWriter;
 
+use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
 use exr::block::writer::ChunksWriter;
-use exr::block::{BlockIndex, UncompressedBlock};
 use exr::error::Error as ExrError;
 use exr::math::{RoundingMode, Vec2};
+use exr::meta::BlockDescription;
 use exr::meta::attribute::{
     AttributeValue, ChannelDescription, IntegerBounds, LevelMode, LineOrder, SampleType, Text,
     TileDescription,
 };
 use exr::meta::header::{Header, ImageAttributes, LayerAttributes};
-use exr::meta::{BlockDescription, MetaData};
 use half::f16;
 use half::slice::HalfFloatSliceExt;
 use model::film::{CHANNEL_COUNT, CHANNELS, Storage};
@@ -25,6 +25,7 @@ use model::{Digest, Rect};
 use super::Source;
 use super::publish::Pending;
 use super::share::in_order;
+use super::zip;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
@@ -67,11 +68,11 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
         &mut out,
         [header(source, &channels)].into_iter().collect(),
         true,
-        |meta, chunks| {
+        |_, chunks| {
             let threads = source.request.threads.max(1);
             let mut waiting = Vec::new();
             let mut write = |waiting: &mut Vec<Tile>| {
-                write_tiles(std::mem::take(waiting), threads, &meta, chunks)
+                write_tiles(std::mem::take(waiting), threads, chunks)
                     .map_err(|error| refused(pending, error))
             };
             let result = source.scratch.for_each_strip(|strip| {
@@ -93,35 +94,30 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
     Ok(hasher.finish())
 }
 
-/// A tile before it is compressed, and its number in the file.
+/// A tile before it is compressed: its place among the tiles, its number in the file, and its samples.
 struct Tile {
+    place: Vec2<usize>,
     number: usize,
-    block: UncompressedBlock,
+    samples: Vec<u8>,
 }
 
 /// Appends the tiles of one strip.
 fn cut(window: Rect, y: u32, lines: &[Vec<u8>], tiles: &mut Vec<Tile>) {
     let width = window.width() as usize;
-    let height = lines.len() / CHANNEL_COUNT;
     let columns = width.div_ceil(TILE);
-    let y = (y - window.y0) as usize;
+    let row = (y - window.y0) as usize / TILE;
     for column in 0..columns {
         let x = column * TILE;
-        let tile_width = TILE.min(width - x);
-        let mut data = Vec::new();
+        let end = width.min(x + TILE);
+        let mut samples = Vec::new();
         for line in lines {
             let bytes = line.len() / width;
-            data.extend_from_slice(&line[x * bytes..(x + tile_width) * bytes]);
+            samples.extend_from_slice(&line[x * bytes..end * bytes]);
         }
-        let index = BlockIndex {
-            layer: 0,
-            pixel_position: Vec2(x, y),
-            pixel_size: Vec2(tile_width, height),
-            level: Vec2(0, 0),
-        };
         tiles.push(Tile {
-            number: y / TILE * columns + column,
-            block: UncompressedBlock { index, data },
+            place: Vec2(column, row),
+            number: row * columns + column,
+            samples,
         });
     }
 }
@@ -130,14 +126,26 @@ fn cut(window: Rect, y: u32, lines: &[Vec<u8>], tiles: &mut Vec<Tile>) {
 fn write_tiles(
     tiles: Vec<Tile>,
     threads: usize,
-    meta: &MetaData,
     chunks: &mut impl ChunksWriter,
 ) -> Result<(), ExrError> {
-    let compressed = in_order(tiles, threads, |Tile { number, block }| {
-        (number, block.compress_to_chunk(&meta.headers))
+    let compressed = in_order(tiles, threads, |tile| {
+        let compressed_pixels_le = zip::compress(tile.samples)?;
+        let block = CompressedTileBlock {
+            coordinates: TileCoordinates {
+                tile_index: tile.place,
+                level_index: Vec2(0, 0),
+            },
+            compressed_pixels_le,
+        };
+        let chunk = Chunk {
+            layer_index: 0,
+            compressed_block: CompressedBlock::Tile(block),
+        };
+        Ok::<_, ExrError>((tile.number, chunk))
     });
-    for (number, chunk) in compressed {
-        chunks.write_chunk(number, chunk?)?;
+    for tile in compressed {
+        let (number, chunk) = tile?;
+        chunks.write_chunk(number, chunk)?;
     }
     Ok(())
 }

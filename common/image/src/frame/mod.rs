@@ -10,6 +10,7 @@ mod png;
 mod ppm;
 pub(crate) mod publish;
 mod share;
+mod zip;
 
 use std::path::PathBuf;
 
