@@ -231,7 +231,7 @@ impl Shell {
         called.map(|(id, _)| *id).collect()
     }
 
-    /// A thread of the disk waits, or waits no more. While the writer waits nobody is late.
+    /// A thread of the disk waits, or waits no more. While blocks wait nobody is late.
     fn disk_says(&mut self, hand: Hand, trouble: Option<String>) {
         let said = match &trouble {
             Some(sentence) => {
@@ -247,7 +247,7 @@ impl Shell {
             Some(sentence) => self.troubles.insert(hand, sentence),
             None => self.troubles.remove(&hand),
         };
-        match self.troubles.contains_key(&Hand::Writer) {
+        match self.troubles.keys().any(|hand| hand.holds_up_blocks()) {
             true => self.clock.hold(),
             false => self.clock.release(),
         }

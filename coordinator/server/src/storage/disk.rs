@@ -15,8 +15,20 @@ const RETRY_INTERVAL: Duration = Duration::from_millis(200);
 pub(crate) enum Hand {
     /// While it waits, nothing is acknowledged.
     Writer,
+    /// While it waits, nothing is acknowledged.
+    Committer,
     /// While it waits, images that are rendered are not finished.
     Encoder,
+}
+
+impl Hand {
+    /// Whether workers would be late for no fault of theirs.
+    pub(crate) fn holds_up_blocks(self) -> bool {
+        match self {
+            Self::Writer | Self::Committer => true,
+            Self::Encoder => false,
+        }
+    }
 }
 
 /// Whether the coordinator stops.

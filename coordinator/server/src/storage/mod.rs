@@ -1,13 +1,15 @@
 //! The disk: blocks are written at their place, synced, and noted in the store, many at a time, with whatever
 //! else must be durable; finished images are encoded.
 //!
-//! Two threads, so that encoding an image never holds up acknowledgements: `writer` and `encoder`. Orders are
-//! performed in the order in which they were given. What waits here is bounded: blocks by the permits they carry,
+//! Three threads: `writer` writes and syncs pixels, `committer` commits behind it, and `encoder` encodes images, which
+//! never holds up acknowledgements. Orders are performed in the order in which they were given: nothing is committed before the pixels
+//! that were ordered before it are synced, and no file is moved or removed before all of that is committed. What waits here is bounded: blocks by the permits they carry,
 //! encodings by the scheduler's images in flight, all of it by [`Storage::is_full`], which its owner asks before it hears anybody.
 //!
 //! A disk that is full, or fails in another way that may pass, fails nothing: the thread waits and tries again, and
 //! the loop is told that it waits (`disk`).
 
+mod committer;
 mod disk;
 mod encoder;
 mod plan;
@@ -79,7 +81,7 @@ pub(crate) struct Encoded {
     pub(crate) result: Result<FinishedFrame, String>,
 }
 
-/// The loop's end of both threads.
+/// The loop's end of the threads.
 #[derive(Debug)]
 pub(crate) struct Storage {
     orders: Sender<Order>,
@@ -100,19 +102,23 @@ impl Storage {
         let (to_encode, encodings) = channel();
         let (stopping, waiting) = (Arc::<Stopping>::default(), Arc::<AtomicUsize>::default());
         let disk = |hand| Disk::new(hand, news.clone(), stopping.clone());
-        let (writers, encoders) = (disk(Hand::Writer), disk(Hand::Encoder));
-        let writer = Writer::new(open, store, to_encode, writers);
+        let (commits, committer) = committer::committer(store, disk(Hand::Committer));
+        let writer = Writer::new(open, commits, to_encode, disk(Hand::Writer));
+        let encoders = disk(Hand::Encoder);
         let left = waiting.clone();
         let writer = std::thread::Builder::new()
             .name("blocks".into())
             .spawn(move || writer.run(&taken, &left))?;
+        let committer = std::thread::Builder::new()
+            .name("store".into())
+            .spawn(move || committer.run())?;
         let encoder = std::thread::Builder::new()
             .name("encoder".into())
             .spawn(move || encoder::encode_all(&encodings, &encoders))?;
         Ok(Self {
             orders,
             waiting,
-            threads: vec![writer, encoder],
+            threads: vec![writer, committer, encoder],
             stopping,
         })
     }

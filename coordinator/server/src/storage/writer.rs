@@ -1,4 +1,4 @@
-//! The thread that makes things durable, in order.
+//! The thread that performs orders, in order: it writes and syncs pixels, and hands over what is to be committed.
 
 use std::collections::BTreeMap;
 use std::collections::btree_map::Entry as Place;
@@ -8,8 +8,9 @@ use std::sync::mpsc::{Receiver, Sender};
 
 use image::Scratch;
 use model::ImageRef;
-use store::{Entry, Store};
+use store::Entry;
 
+use super::committer::{Batch, Commits};
 use super::disk::Disk;
 use super::encoder::Encoding;
 use super::{Encoded, Open, Order, Plan, Stored, Ticket, chain};
@@ -17,12 +18,12 @@ use crate::input::News;
 
 /// Most blocks and records that are made durable together. More would delay the first one's
 /// acknowledgement, and save nothing: a sync's cost is spread thin already.
-const GROUP_MAX: usize = 256;
+pub(super) const GROUP_MAX: usize = 256;
 
-/// The thread that owns the store and the scratch files.
+/// The thread that owns the scratch files.
 pub(super) struct Writer {
     open: Open,
-    store: Box<dyn Store>,
+    commits: Commits,
     to_encode: Sender<Encoding>,
     disk: Disk,
     /// Whether something was given up: then nothing that was ordered later may be done.
@@ -46,13 +47,13 @@ impl Group {
 impl Writer {
     pub(super) fn new(
         open: Open,
-        store: Box<dyn Store>,
+        commits: Commits,
         to_encode: Sender<Encoding>,
         disk: Disk,
     ) -> Self {
         Self {
             open,
-            store,
+            commits,
             to_encode,
             disk,
             is_over: false,
@@ -84,6 +85,8 @@ impl Writer {
                     }
                     other => {
                         self.settle(&mut group);
+                        self.commits.settle();
+                        self.is_over |= self.commits.is_over();
                         // What follows from a commit that failed must not be done.
                         if !self.is_over {
                             self.perform(other);
@@ -148,7 +151,7 @@ impl Writer {
         Some(())
     }
 
-    /// Makes a group durable, each scratch file once, then the store, and says so.
+    /// Makes the pixels of a group durable, each scratch file once, and has the rest committed.
     fn settle(&mut self, group: &mut Group) {
         let Group {
             mut blocks,
@@ -175,28 +178,12 @@ impl Writer {
             .map(|stored| stored.arrived.entry())
             .chain(records)
             .collect();
-        let store = &mut self.store;
-        let commit = || match store.commit(&entries) {
-            Ok(()) => Ok(Ok(())),
-            Err(error) if error.is_transient() => Err(chain(&error)),
-            Err(error) => Ok(Err(chain(&error))),
-        };
-        match self.disk.insist(|| true, commit) {
-            Some(Ok(())) => {}
-            given_up => {
-                self.is_over = true;
-                if let Some(Err(sentence)) = given_up {
-                    self.disk.say(News::Broken(sentence));
-                }
-                return;
-            }
-        }
-        if !stored.is_empty() {
-            self.disk.say(News::Stored(stored));
-        }
-        if let Some(ticket) = ticket {
-            self.disk.say(News::Committed(ticket));
-        }
+        self.commits.hand_over(Batch {
+            entries,
+            stored,
+            ticket,
+        });
+        self.is_over |= self.commits.is_over();
     }
 
     fn perform(&mut self, order: Order) {
