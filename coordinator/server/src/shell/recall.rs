@@ -149,18 +149,20 @@ impl Shell {
         }
         // Nothing of it happened later than now, whatever the calendar says.
         let latest = self.clock.started();
-        let mut effects = Vec::new();
-        for (unix_ms, event) in recalled.events() {
-            let then = Timestamp(unix_ms.saturating_mul(1_000)).min(latest);
-            self.sched.handle(then, event, &mut effects);
-        }
         let still_wanted = |effect: &Effect| {
             matches!(
                 effect,
                 Effect::Encode { .. } | Effect::ForgetJob { .. } | Effect::GiveUp { .. }
             )
         };
-        for effect in effects.into_iter().filter(still_wanted) {
+        let (mut effects, mut wanted) = (Vec::new(), Vec::new());
+        for (unix_ms, event) in recalled.events() {
+            let then = Timestamp(unix_ms.saturating_mul(1_000)).min(latest);
+            self.sched.handle(then, event, &mut effects);
+            // Every block is acknowledged, to nobody: a million of those are not kept until the end.
+            wanted.extend(effects.drain(..).filter(still_wanted));
+        }
+        for effect in wanted {
             self.perform(effect);
         }
         for (id, job) in self.jobs.iter_mut() {
