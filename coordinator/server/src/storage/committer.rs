@@ -72,6 +72,11 @@ impl Commits {
         self.is_over |= self.batches.send(batch).is_err();
     }
 
+    /// Whether something was handed over of which nothing is known yet.
+    pub(super) fn are_ahead(&self) -> bool {
+        self.ahead > 0
+    }
+
     /// Waits until everything that was handed over is committed, or will never be.
     pub(super) fn settle(&mut self) {
         self.wait(0);

@@ -20,6 +20,11 @@ use crate::input::News;
 /// acknowledgement, and save nothing: a sync's cost is spread thin already.
 pub(super) const GROUP_MAX: usize = 256;
 
+/// From so many blocks and records on, or so many bytes of pixels, a group is written while the one before it is
+/// committed. Less waits for that, and for what comes meanwhile: a sync for little costs as much as one for all.
+const PIPELINED_MIN: usize = 64;
+const PIPELINED_BYTES_MIN: usize = 256 << 10;
+
 /// The thread that owns the scratch files.
 pub(super) struct Writer {
     open: Open,
@@ -41,6 +46,14 @@ struct Group {
 impl Group {
     fn len(&self) -> usize {
         self.blocks.len() + self.records.len()
+    }
+
+    fn is_worth_a_sync(&self) -> bool {
+        let payloads = self
+            .blocks
+            .iter()
+            .map(|(_, stored)| stored.arrived.payload.len());
+        self.len() >= PIPELINED_MIN || payloads.sum::<usize>() >= PIPELINED_BYTES_MIN
     }
 }
 
@@ -85,19 +98,19 @@ impl Writer {
                     }
                     other => {
                         self.settle(&mut group);
-                        self.commits.settle();
-                        self.is_over |= self.commits.is_over();
+                        self.settle_commits();
                         // What follows from a commit that failed must not be done.
                         if !self.is_over {
                             self.perform(other);
                         }
                     }
                 }
-                next = if group.len() < GROUP_MAX {
-                    orders.try_recv().ok().map(take)
-                } else {
-                    None
-                };
+                let more = || orders.try_recv().ok().map(take);
+                next = (group.len() < GROUP_MAX).then(more).flatten();
+                if next.is_none() && !group.is_worth_a_sync() && self.commits.are_ahead() {
+                    self.settle_commits();
+                    next = more();
+                }
             }
             self.settle(&mut group);
         }
@@ -183,6 +196,11 @@ impl Writer {
             stored,
             ticket,
         });
+        self.is_over |= self.commits.is_over();
+    }
+
+    fn settle_commits(&mut self) {
+        self.commits.settle();
         self.is_over |= self.commits.is_over();
     }
 
