@@ -38,7 +38,11 @@ pub(super) fn authority(state: &Path) -> Vec<Finding> {
     let Ok(text) = fs::read_to_string(&path) else {
         return Vec::new();
     };
-    let mut findings = modes("authority", &[path, state.join(place::TOKENS_FILE)]);
+    let mut findings = modes(
+        "authority",
+        &[path, state.join(place::TOKENS_FILE)],
+        "where somebody may have read the authority's key, move it away, start the coordinator again and make new tokens",
+    );
     let facts = of_pem(&text).and_then(|certificate| Facts::read(&certificate));
     findings.push(match facts {
         None => Finding::bad(
@@ -102,7 +106,11 @@ pub(super) fn joined(state: &Path) -> Vec<Finding> {
         return Vec::new();
     }
     let keys: Vec<PathBuf> = places.iter().map(|place| place.join("key.pem")).collect();
-    let mut findings = modes("joined", &keys);
+    let mut findings = modes(
+        "joined",
+        &keys,
+        "where somebody may have read it, revoke the token that the worker joined by",
+    );
     let facts: Vec<Facts> = places
         .iter()
         .filter_map(|place| Facts::read(&fs::read(place.join("certificate.der")).ok()?))
@@ -133,7 +141,7 @@ pub(super) fn joined(state: &Path) -> Vec<Finding> {
 }
 
 /// Those of the files that others can read.
-fn modes(part: &'static str, files: &[PathBuf]) -> Vec<Finding> {
+fn modes(part: &'static str, files: &[PathBuf], and: &str) -> Vec<Finding> {
     let open = |path: &&PathBuf| {
         fs::metadata(path).is_ok_and(|metadata| metadata.permissions().mode() & 0o077 != 0)
     };
@@ -143,7 +151,7 @@ fn modes(part: &'static str, files: &[PathBuf]) -> Vec<Finding> {
         Finding::bad(
             part,
             format!("others can read {shown}"),
-            format!("`chmod 600 {shown}`; whoever has read it can pass for the farm or its worker: revoke the token, or make a new authority"),
+            format!("`chmod 600 {shown}`; {and}"),
         )
     })
     .collect()

@@ -108,3 +108,52 @@ fn an_address_of_another_machine_needs_a_token() {
     let list = place.flyby(["job", "list", "--coordinator", "203.0.113.1:7359"]);
     list.refused(USAGE, &["a token is needed", "--token-file"]);
 }
+
+#[test]
+fn the_doctor_looks_at_certificates_and_their_keys() {
+    let Some(address) = need::address() else {
+        return;
+    };
+    let farm = Farm::reachable(address, &[]);
+    let (user, token) = (
+        farm.token("u.token", &["--role", "view"]),
+        farm.token("w.token", &[]),
+    );
+    let there = Place::new();
+    let worker = [
+        "worker",
+        "--while-input-open",
+        "--threads",
+        "1",
+        "--token-file",
+        &token,
+    ];
+    let _worker = there.start("worker", worker);
+    farm.wait_connected(1);
+    let look = |place: &Place, more: &[&str]| {
+        let command = ["farm", "doctor", "--output", "json"].into_iter();
+        let outcome = place.flyby(command.chain(more.iter().copied()));
+        let said: serde_json::Value = serde_json::from_str(&outcome.stdout).unwrap();
+        said
+    };
+    let verdict = |said: &serde_json::Value, part: &str| {
+        let findings = said["findings"].as_array().unwrap();
+        let found = findings.iter().find(|finding| finding["part"] == part);
+        let found = found.unwrap_or_else(|| panic!("no {part}: {said}"));
+        found["verdict"].as_str().unwrap().to_owned()
+    };
+    let abroad = ["--token-file", user.as_str()];
+    let said = look(&there, &abroad);
+    for part in ["token", "joined", "coordinator", "clock", "certificate"] {
+        assert_eq!(verdict(&said, part), "fine", "{said}");
+    }
+    assert_eq!(verdict(&look(&farm.place, &[]), "authority"), "fine");
+    let keys = there.files("state/joined");
+    let key = keys.iter().find(|file| file.ends_with("key.pem")).unwrap();
+    let key = there.state().join("joined").join(key);
+    for open in [key, farm.place.state().join("authority.pem")] {
+        fs::set_permissions(open, Permissions::from_mode(0o644)).unwrap();
+    }
+    assert_eq!(verdict(&look(&there, &abroad), "joined"), "bad");
+    assert_eq!(verdict(&look(&farm.place, &[]), "authority"), "bad");
+}

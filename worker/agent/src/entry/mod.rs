@@ -69,7 +69,7 @@ impl Invitation {
 #[derive(Debug)]
 pub(crate) enum Access {
     Local(Way),
-    Member(Member),
+    Member(Box<Member>),
 }
 
 impl Access {
@@ -78,7 +78,7 @@ impl Access {
             Entry::Local { coordinator, token } => {
                 Self::Local(Way::local(*coordinator, token.clone()))
             }
-            Entry::Invited(invitation) => Self::Member(Member::new(invitation.clone())?),
+            Entry::Invited(invitation) => Self::Member(Box::new(Member::new(invitation.clone())?)),
         })
     }
 
