@@ -16,6 +16,8 @@ pub(crate) struct Context {
     pub(crate) output: crate::output::Format,
     /// The state folder: named, or the usual one; `None` where the user has no home.
     pub(crate) state: Option<PathBuf>,
+    /// The file of a token, by which the coordinator of another machine is reached.
+    pub(crate) token_file: Option<PathBuf>,
 }
 
 /// A scene and what to change in it.
@@ -144,7 +146,7 @@ impl Default for PlaceOptions {
 /// Which coordinator to talk to.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct FarmOptions {
-    /// Address and port of the coordinator; else the one that runs over the state folder.
+    /// Address and port of the coordinator; else those that the token's file names, or the one that runs over the state folder.
     #[arg(long, value_name = "ADDR", help_heading = "Farm")]
     pub(crate) coordinator: Option<SocketAddr>,
 }

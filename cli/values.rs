@@ -140,6 +140,33 @@ pub(crate) fn span(text: &str) -> Result<Span, String> {
     }
 }
 
+/// How long a certificate may count: long enough to be renewed in time, and no longer than somebody may be away.
+pub(crate) fn certificate_life(text: &str) -> Result<Span, String> {
+    match span(text)? {
+        life if (Span::from_secs(3)..=Span::from_secs(31 * 86_400)).contains(&life) => Ok(life),
+        _ => Err(format!("`{text}` is out of range: 3 s to 31 d is possible")),
+    }
+}
+
+/// A host or an address, with a port.
+pub(crate) fn host_port(text: &str) -> Result<String, String> {
+    let parts = text.rsplit_once(':');
+    let right = parts.is_some_and(|(host, port)| {
+        let host = host.trim_start_matches('[').trim_end_matches(']');
+        let plain = |letter: char| letter.is_ascii_alphanumeric() || "-.:_%".contains(letter);
+        !host.is_empty()
+            && host.len() <= 253
+            && host.chars().all(plain)
+            && port.parse::<u16>().is_ok_and(|port| port > 0)
+    });
+    match right {
+        true => Ok(text.to_owned()),
+        false => Err(format!(
+            "`{text}` is no host with a port: write it as farm.example.org:7359 or [2001:db8::1]:7359"
+        )),
+    }
+}
+
 /// A number of things of which there is at least one.
 pub(crate) fn at_least_one(text: &str) -> Result<usize, String> {
     match text.trim().parse() {

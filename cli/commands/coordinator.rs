@@ -17,9 +17,19 @@ use crate::{Ending, values};
 
 #[derive(Args, Debug)]
 pub(crate) struct Coordinator {
-    /// Where to listen; on this machine only. Port 0 takes any free one.
+    /// Where to listen; `0.0.0.0:7359` is every address of this machine. Port 0 takes any free one. Whoever is not on this
+    /// machine speaks TLS, and needs a token (`flyby token create`).
     #[arg(long, value_name = "ADDR", default_value_t = SocketAddr::from((Ipv4Addr::LOCALHOST, wire::place::DEFAULT_PORT)))]
     listen: SocketAddr,
+
+    /// Where other machines reach it, for the files of tokens, such as farm.example.org:7359; may be repeated [default:
+    /// where it listens, or the addresses by which this machine reaches others].
+    #[arg(long, value_name = "HOST:PORT", value_parser = values::host_port)]
+    advertise: Vec<String>,
+
+    /// How long certificates count: its own, and those of workers. They are renewed at two thirds of that; 3 s to 31 d.
+    #[arg(long, value_name = "TIME", default_value = "24 h", value_parser = values::certificate_life)]
+    certificate_life: Span,
 
     /// A worker of which nothing is heard for so long is lost, such as 4 s.
     #[arg(long, value_name = "TIME", default_value = "4 s", value_parser = values::span)]
@@ -55,6 +65,8 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
     let usual = server::Config::new(state, revision, daemon::software());
     let config = server::Config {
         listen: options.listen,
+        advertise: options.advertise.clone(),
+        certificate_life: options.certificate_life,
         liveness_limit: options.liveness,
         // Four heartbeats may be missed, and one a second is enough.
         heartbeat_interval: Span((options.liveness.0 / 4).clamp(1_000, 1_000_000)),
@@ -93,7 +105,6 @@ fn program(path: &Path) -> Result<PathBuf, Error> {
 
 fn not_started(error: StartError) -> Error {
     match error {
-        StartError::NotLoopback(_) => Error::usage("cannot start the coordinator").because(error),
         StartError::PortInUse(address) => Error::failed(format!(
             "cannot listen on {address}: another program listens there"
         ))

@@ -12,6 +12,7 @@ mod noise;
 mod render;
 mod scene;
 mod submit;
+mod token;
 mod worker;
 
 use std::path::PathBuf;
@@ -55,6 +56,10 @@ pub(crate) struct Cli {
     /// [default: $XDG_STATE_HOME/flyby or ~/.local/state/flyby].
     #[arg(long, global = true, value_name = "DIR", help_heading = "Everywhere")]
     state: Option<PathBuf>,
+
+    /// File of a token (`flyby token create`), by which a coordinator on another machine is reached.
+    #[arg(long, global = true, value_name = "FILE", help_heading = "Everywhere")]
+    token_file: Option<PathBuf>,
 }
 
 #[derive(Subcommand, Debug)]
@@ -72,6 +77,9 @@ enum Command {
     /// Your jobs: how they stand, their frames, their place among others.
     #[command(subcommand)]
     Job(job::JobCommand),
+    /// Tokens, by which users and workers on other machines reach the farm.
+    #[command(subcommand)]
+    Token(token::TokenCommand),
     /// The farm: how it stands, what is wrong with it, what can be cleaned away.
     #[command(subcommand)]
     Farm(farm::FarmCommand),
@@ -100,6 +108,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
     let context = Context {
         output: cli.output,
         state: cli.state.or(state),
+        token_file: cli.token_file,
     };
     match cli.command {
         Command::Demo(options) => demo::run(&context, &options),
@@ -108,6 +117,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Worker(command) => worker::run(&context, command),
         Command::Submit(options) => submit::run(&context, &options),
         Command::Job(command) => job::run(&context, command),
+        Command::Token(command) => token::run(&context, command),
         Command::Farm(command) => farm::run(&context, command),
         Command::Scene(command) => scene::run(&context, command),
         Command::Image(command) => image::run(&context, command),

@@ -5,12 +5,13 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use agent::{Ask, ExitReason, RenderPainter, RunError};
+use agent::{Ask, Entry, ExitReason, Invitation, RenderPainter, RunError};
 use clap::{Args, Subcommand};
 use model::Span;
 use render::SimdLevel;
 use serde::Serialize;
 use tokio::sync::mpsc;
+use wire::place;
 use wire::proto::{self, ListWorkersRequest, WorkerList};
 
 use super::render::processors;
@@ -171,8 +172,8 @@ async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error>
 }
 
 fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
-    let coordinator = context.address(&options.farm)?;
-    let token = context.token()?;
+    let entry = entry(context, options)?;
+    let coordinator = entry.to_string();
     let home = match &options.name {
         Some(name) => Some(Home::take(&context.state()?, name)?),
         None => None,
@@ -187,7 +188,7 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         memory_bytes: memory_bytes(),
         labels: options.label.clone(),
         time_limit: options.time_limit,
-        ..agent::Config::new(coordinator, token, name, threads.unwrap_or(NonZeroU32::MIN))
+        ..agent::Config::new(entry, name, threads.unwrap_or(NonZeroU32::MIN))
     };
     let painter = RenderPainter::new(options.simd.unwrap_or_else(SimdLevel::best));
     options.daemon.log()?;
@@ -216,6 +217,30 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         .because(reason)
         .next("start one with `flyby coordinator`, then this worker again")),
     }
+}
+
+/// How it gets to the coordinator: by a token's file, or on this machine by the state folder.
+fn entry(context: &Context, options: &Worker) -> Result<Entry, Error> {
+    let Some(file) = context.token_file()? else {
+        let address = context.address(&options.farm)?;
+        return Ok(Entry::Local {
+            coordinator: context.on_this_machine(address)?,
+            token: context.token()?,
+        });
+    };
+    if file.role != "worker" {
+        return Err(Error::usage(format!(
+            "the token has the role `{}`, and workers join by one of the role `worker`",
+            file.role
+        ))
+        .next("make one with `flyby token create --role worker`"));
+    }
+    let keep = context.state.as_deref();
+    Ok(Entry::Invited(Invitation {
+        file,
+        address: options.farm.coordinator.map(|address| address.to_string()),
+        keep: keep.map(|state| state.join(place::JOINED_FOLDER)),
+    }))
 }
 
 fn cannot_run(error: RunError) -> Error {

@@ -1,5 +1,7 @@
 //! What is wrong with a farm, and what to do about it: every part is looked at, whatever the others say.
 
+mod certificates;
+
 use std::fs;
 use std::io::{self, Write};
 use std::os::unix::fs::PermissionsExt as _;
@@ -20,7 +22,7 @@ use crate::output::Report;
 /// Room below which a disk will soon be full.
 const ROOM_LOW: u64 = 2 << 30;
 
-/// Clocks that differ by more confuse logs, and soon certificates.
+/// Clocks that differ by more confuse logs, and by minutes certificates.
 const CLOCKS_APART: Duration = Duration::from_secs(5);
 
 /// How something stands.
@@ -47,7 +49,8 @@ pub(crate) struct Examination {
 /// One thing that was looked at.
 #[derive(Serialize)]
 struct Finding {
-    /// What: `state`, `token`, `store`, `coordinator`, `versions`, `clock`, `disk`, `workers`, `pixels`.
+    /// What: `state`, `token`, `store`, `authority`, `joined`, `coordinator`, `versions`, `clock`, `certificate`, `disk`,
+    /// `workers`, `pixels`.
     part: &'static str,
     /// How it stands.
     verdict: Verdict,
@@ -111,11 +114,15 @@ impl Report for Examination {
 pub(crate) async fn look(context: &Context, options: &FarmOptions) -> Result<Examination, Error> {
     let state = context.state()?;
     let mut findings = Vec::new();
-    if options.coordinator.is_none() {
+    if let Some(file) = &context.token_file {
+        findings.push(certificates::token_file(file));
+    } else if options.coordinator.is_none() {
         findings.push(state_folder(&state));
         findings.push(token(&state));
         findings.extend(store(&state));
+        findings.extend(certificates::authority(&state));
     }
+    findings.extend(certificates::joined(&state));
     findings.extend(farm(context, options, &state).await);
     let worst = findings.iter().map(|finding| finding.verdict).max();
     Ok(Examination {
@@ -192,10 +199,13 @@ fn store(state: &Path) -> Option<Finding> {
 
 /// The coordinator, and what it says.
 async fn farm(context: &Context, options: &FarmOptions, state: &Path) -> Vec<Finding> {
-    let address = match (options.coordinator, place::coordinator(state)) {
-        (Some(address), _) => address,
-        (None, Ok(coordinator)) => coordinator.address,
-        (None, Err(error)) => {
+    let address = match (context.way(options), place::coordinator(state)) {
+        (Ok(way), _) => way.to_string(),
+        (Err(_), Ok(coordinator)) => coordinator.address.to_string(),
+        (Err(error), _) if context.token_file.is_some() || options.coordinator.is_some() => {
+            return vec![Finding::bad("coordinator", error.to_string(), "see above")];
+        }
+        (Err(_), Err(error)) => {
             let next = match error {
                 NotFound::NotRunning(_) => "start one with `flyby coordinator`",
                 _ => "stop the coordinator, remove the file, and start it again",
@@ -237,6 +247,7 @@ async fn farm(context: &Context, options: &FarmOptions, state: &Path) -> Vec<Fin
         ),
         versions(&info),
         clock(info.now_unix_ms, round_trip),
+        certificates::own(info.certificate_until_unix_ms, info.now_unix_ms),
         disk(&info),
     ];
     match farm.list_workers(ListWorkersRequest {}).await {
@@ -293,7 +304,7 @@ fn clock(theirs_unix_ms: u64, round_trip: Duration) -> Finding {
                 "the coordinator's clock and this one are {} s apart",
                 apart.as_secs()
             ),
-            "let both follow a time server; frames do not depend on it, times in logs do",
+            "let both follow a time server; frames do not depend on it, certificates and times in logs do",
         );
     }
     Finding::fine("clock", "the coordinator's and this one agree")

@@ -10,6 +10,8 @@ use wire::failure::Retry;
 use wire::link::Farm;
 use wire::place;
 use wire::proto::ErrorKind;
+use wire::tls::token_file::TokenFile;
+use wire::way::Way;
 
 use crate::error::{Ending, Error};
 use crate::options::{Context, FarmOptions};
@@ -32,6 +34,42 @@ impl Context {
         })
     }
 
+    /// The token's file that was named, if one was.
+    pub(crate) fn token_file(&self) -> Result<Option<TokenFile>, Error> {
+        let Some(path) = &self.token_file else {
+            return Ok(None);
+        };
+        TokenFile::read(path).map(Some).map_err(|error| {
+            let unusable = Error::usage(error.to_string());
+            match std::error::Error::source(&error) {
+                Some(source) => unusable.because(source.to_string()),
+                None => unusable,
+            }
+        })
+    }
+
+    /// How the coordinator is reached: as the token's file says, or on this machine by its state folder.
+    pub(crate) fn way(&self, options: &FarmOptions) -> Result<Way, Error> {
+        if let Some(file) = self.token_file()? {
+            let address = options.coordinator.map(|address| address.to_string());
+            return Way::by_token(&file, address)
+                .map_err(|failure| Error::failed("cannot set up TLS").because(failure));
+        }
+        let address = self.address(options)?;
+        Ok(Way::local(self.on_this_machine(address)?, self.token()?))
+    }
+
+    /// An address that is reached in the clear, which only one of this machine may be.
+    pub(crate) fn on_this_machine(&self, address: SocketAddr) -> Result<SocketAddr, Error> {
+        match address.ip().to_canonical().is_loopback() {
+            true => Ok(address),
+            false => Err(Error::usage(format!(
+                "the coordinator at {address} is reached by TLS, and for that a token is needed"
+            ))
+            .next("make one where it runs (`flyby token create --out FILE`), bring the file here, and name it with `--token-file FILE`; on its own machine leave `--coordinator` away")),
+        }
+    }
+
     /// Where the coordinator listens: as told, or as it says in its state folder.
     pub(crate) fn address(&self, options: &FarmOptions) -> Result<SocketAddr, Error> {
         match options.coordinator {
@@ -49,14 +87,18 @@ impl Context {
 
     /// Opens a connection to the coordinator.
     pub(crate) async fn connect(&self, options: &FarmOptions) -> Result<Farm, Error> {
-        let address = self.address(options)?;
-        wire::link::farm(address, self.token()?)
-            .await
-            .map_err(|error| {
-                Error::unreachable(format!("no coordinator answers at {address}"))
-                .because(error)
-                .next("start one with `flyby coordinator`, or say where it is with `--coordinator`")
-            })
+        let way = self.way(options)?;
+        wire::link::farm(&way).await.map_err(|failure| {
+            let sure = failure.kind == ErrorKind::Unauthenticated;
+            let refused = Error::unreachable(failure.sentence);
+            match sure {
+                // The sentence says what to do.
+                true => refused,
+                false => refused.next(
+                    "start one with `flyby coordinator`, or say where it is with `--coordinator`",
+                ),
+            }
+        })
     }
 }
 
@@ -78,6 +120,7 @@ pub(crate) fn refused(attempt: impl Into<String>, failure: impl Into<Failure>) -
             Ending::Usage
         }
         ErrorKind::Unauthenticated
+        | ErrorKind::Forbidden
         | ErrorKind::WrongProtocol
         | ErrorKind::WrongRevision
         | ErrorKind::Limit
@@ -98,6 +141,7 @@ mod tests {
         let context = Context {
             output: crate::output::Format::Table,
             state: Some(folder.path().to_owned()),
+            token_file: None,
         };
         let error = context
             .address(&FarmOptions { coordinator: None })

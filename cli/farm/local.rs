@@ -98,6 +98,7 @@ impl LocalFarm {
     pub(crate) fn context(&self, context: &Context) -> (Context, FarmOptions) {
         let context = Context {
             state: Some(self.state.path().to_owned()),
+            token_file: None,
             ..context.clone()
         };
         let options = FarmOptions {

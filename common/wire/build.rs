@@ -3,8 +3,9 @@
 use std::error::Error;
 use std::path::Path;
 
-const FILES: [&str; 3] = [
+const FILES: [&str; 4] = [
     "flyby/v1/common.proto",
+    "flyby/v1/joining.proto",
     "flyby/v1/user.proto",
     "flyby/v1/worker.proto",
 ];

@@ -30,3 +30,4 @@ mod restart;
 mod resume;
 mod same_pixels;
 mod stopping;
+mod trust;

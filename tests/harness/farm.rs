@@ -1,6 +1,6 @@
 //! A coordinator, its workers and its jobs.
 
-use std::net::{Ipv4Addr, SocketAddr, TcpListener};
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener};
 use std::time::Duration;
 
 use serde_json::Value;
@@ -24,8 +24,10 @@ pub(crate) struct Farm {
     pub(crate) workers: Vec<Process>,
     /// Its coordinator.
     pub(crate) coordinator: Process,
-    /// Where the coordinator listens.
+    /// Where the coordinator listens on this machine.
     pub(crate) address: SocketAddr,
+    /// Where it is told to listen when it is started again.
+    listen: SocketAddr,
     /// Where everything lies.
     pub(crate) place: Place,
     /// What its coordinator is started by, and with which further options, each time.
@@ -42,6 +44,15 @@ impl Farm {
     /// [`Farm::new`] in a place that a test has prepared, its coordinator started by another
     /// program that is given `wrapper`'s further words.
     pub(crate) fn wrapped(place: Place, wrapper: &[&str], options: &[&str]) -> Self {
+        Self::listening(Ipv4Addr::LOCALHOST.into(), place, wrapper, options)
+    }
+
+    /// A coordinator that listens on an address that other machines can reach, and on loopback.
+    pub(crate) fn reachable(address: IpAddr, options: &[&str]) -> Self {
+        Self::listening(address, Place::new(), &[], options)
+    }
+
+    fn listening(on: IpAddr, place: Place, wrapper: &[&str], options: &[&str]) -> Self {
         let kept = |words: &[&str]| {
             words
                 .iter()
@@ -49,9 +60,11 @@ impl Farm {
                 .collect::<Vec<_>>()
         };
         let (wrapper, options) = (kept(wrapper), kept(options));
-        let mut coordinator = start_coordinator(&place, "127.0.0.1:0", &wrapper, &options);
+        let anywhere = SocketAddr::new(on, 0).to_string();
+        let mut coordinator = start_coordinator(&place, &anywhere, &wrapper, &options);
         let address = says_where(&place, &mut coordinator);
         Self {
+            listen: SocketAddr::new(on, address.port()),
             workers: Vec::new(),
             coordinator,
             address,
@@ -66,8 +79,8 @@ impl Farm {
     pub(crate) fn start_again(&mut self) {
         // One that was killed could not take it back.
         let _ = std::fs::remove_file(self.place.state().join("coordinator.json"));
-        let address = self.address.to_string();
-        self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
+        let listen = self.listen.to_string();
+        self.coordinator = start_coordinator(&self.place, &listen, &self.wrapper, &self.options);
         assert_eq!(says_where(&self.place, &mut self.coordinator), self.address);
     }
 
@@ -79,8 +92,8 @@ impl Farm {
         let before = epoch();
         // One that was killed could not take it back.
         let _ = std::fs::remove_file(state.join("coordinator.json"));
-        let address = self.address.to_string();
-        self.coordinator = start_coordinator(&self.place, &address, &self.wrapper, &self.options);
+        let listen = self.listen.to_string();
+        self.coordinator = start_coordinator(&self.place, &listen, &self.wrapper, &self.options);
         match moment {
             Moment::AtOnce => {}
             Moment::Counted => wait::until("the coordinator counts its start", || {
@@ -114,6 +127,21 @@ impl Farm {
             farm.worker(&["--threads", "1"]);
         }
         farm
+    }
+
+    /// Where other machines can reach the coordinator.
+    pub(crate) fn outside(&self) -> SocketAddr {
+        self.listen
+    }
+
+    /// Makes a token with these further options; answers its file, which lies in the coordinator's place.
+    #[track_caller]
+    pub(crate) fn token(&self, name: &str, options: &[&str]) -> String {
+        let file = self.place.path(name).to_str().unwrap().to_owned();
+        let command = ["token", "create", "--out", &file];
+        self.flyby(command.into_iter().chain(options.iter().copied()))
+            .ok();
+        file
     }
 
     /// Starts a worker with these further options; answers its place in [`Farm::workers`].

@@ -2,6 +2,7 @@
 
 use std::fs::OpenOptions;
 use std::io::Write as _;
+use std::net::{IpAddr, Ipv4Addr, UdpSocket};
 use std::process::{Command, Stdio};
 
 /// Whether the program `tool` is here; if not, the test that asks must return.
@@ -53,6 +54,26 @@ pub(crate) fn mounting() -> Option<&'static [&'static str]> {
         );
     }
     way
+}
+
+/// An address of this machine that is not loopback; where there is none, the test that asks must return.
+#[must_use]
+pub(crate) fn address() -> Option<IpAddr> {
+    let own = || {
+        let socket = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).ok()?;
+        // Nothing is sent: the system only chooses a route.
+        socket.connect(("203.0.113.1", 9)).ok()?;
+        let ip = socket.local_addr().ok()?.ip();
+        Some(ip).filter(|ip| !ip.is_loopback() && !ip.is_unspecified())
+    };
+    let found = own();
+    if found.is_none() {
+        skip(
+            "other machines",
+            "this machine has no address but loopback, so that nothing speaks TLS",
+        );
+    }
+    found
 }
 
 fn skip(name: &str, why: &str) {

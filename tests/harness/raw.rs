@@ -17,6 +17,7 @@ use wire::proto::{
     WorkerIdentity, control_down, deliver_down,
 };
 use wire::version::{PROTOCOL_MAX, PROTOCOL_MIN};
+use wire::way::Way;
 use wire::{Failure, link};
 
 use super::wait;
@@ -52,9 +53,8 @@ impl Raw {
             .unwrap();
         let token: Token = token.parse().unwrap();
         let open = || {
-            runtime
-                .block_on(link::workers(coordinator, token.clone()))
-                .unwrap()
+            let way = Way::local(coordinator, token.clone());
+            runtime.block_on(link::workers(&way)).unwrap()
         };
         let (control, delivery) = (open(), open());
         Self {
@@ -164,9 +164,21 @@ pub(crate) fn call(
     message: &'static [u8],
 ) -> Result<(), Status> {
     let runtime = Builder::new_current_thread().enable_all().build().unwrap();
+    let way = Way::local(coordinator, token.parse().unwrap());
+    call_over(&runtime, &way, token, method, message)
+}
+
+/// [`call`] over any way; `token` is sent with it.
+pub(crate) fn call_over(
+    runtime: &Runtime,
+    way: &Way,
+    token: &str,
+    method: &str,
+    message: &'static [u8],
+) -> Result<(), Status> {
     let mut token: Token = token.parse().unwrap();
     runtime.block_on(async {
-        let channel = link::endpoint(coordinator).connect().await.unwrap();
+        let channel = way.open().await.unwrap();
         let mut client = tonic::client::Grpc::new(channel);
         client.ready().await.unwrap();
         let request = token.call(Request::new(())).unwrap();

@@ -12,6 +12,7 @@ use wire::auth::Token;
 use wire::link::Farm;
 use wire::proto::job_update::Update;
 use wire::proto::{JobRequest, JobSummary, JobUpdate, ListJobsRequest, WhyRequest};
+use wire::way::Way;
 
 use crate::error::Error;
 use crate::farm::link::refused;
@@ -48,7 +49,7 @@ impl<'a> Coordinator<'a> {
         let token = wire::place::token(state)
             .map_err(|error| Error::failed("the coordinator left no token").because(error))?;
         let farm = runtime
-            .block_on(wire::link::farm(address, token.clone()))
+            .block_on(wire::link::farm(&Way::local(address, token.clone())))
             .map_err(|error| Error::failed("the coordinator does not answer").because(error))?;
         Ok(Self {
             runtime,

@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use agent::{Ask, ExitReason, RunError};
+use agent::{Ask, Entry, ExitReason, RunError};
 use tokio::runtime::Runtime;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
@@ -39,12 +39,11 @@ impl<'a> Crew<'a> {
         null: Null,
     ) -> Self {
         let workers = (1..=count).map(|number| {
-            let config = agent::Config::new(
+            let entry = Entry::Local {
                 coordinator,
-                token.clone(),
-                format!("null-{number}"),
-                threads,
-            );
+                token: token.clone(),
+            };
+            let config = agent::Config::new(entry, format!("null-{number}"), threads);
             let (asks, heard) = mpsc::channel(1);
             let painter = Arc::new(null.clone());
             (asks, runtime.spawn(agent::run(config, painter, heard)))

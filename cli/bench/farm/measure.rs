@@ -228,6 +228,7 @@ impl<'a> Bench<'a> {
         };
         let context = Context {
             state: Some(state.to_owned()),
+            token_file: None,
             ..self.context.clone()
         };
         let farm = FarmOptions {

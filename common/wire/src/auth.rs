@@ -29,17 +29,14 @@ impl std::str::FromStr for Token {
     type Err = NotAToken;
 
     fn from_str(text: &str) -> Result<Self, NotAToken> {
-        let text = text.trim();
+        let text = text.trim().to_ascii_lowercase();
         if text.len() != 64 || !text.bytes().all(|byte| byte.is_ascii_hexdigit()) {
             return Err(NotAToken);
         }
         let mut header: MetadataValue<Ascii> =
             format!("Bearer {text}").parse().map_err(|_| NotAToken)?;
         header.set_sensitive(true);
-        Ok(Self {
-            text: text.to_owned(),
-            header,
-        })
+        Ok(Self { text, header })
     }
 }
 
@@ -53,6 +50,17 @@ impl Token {
     /// Its text; for its file alone.
     pub fn reveal(&self) -> &str {
         &self.text
+    }
+
+    /// What a coordinator keeps of it: a digest, from which nobody gets back to the secret.
+    pub fn digest(&self) -> model::Digest {
+        model::Digest(blake3::derive_key("flyby 2026 token", self.text.as_bytes()))
+    }
+
+    /// The token that a call's metadata carries, if it is one.
+    pub fn said(metadata: &MetadataMap) -> Option<Self> {
+        let said = metadata.get("authorization")?.to_str().ok()?;
+        said.strip_prefix("Bearer ")?.parse().ok()
     }
 
     /// Whether a call's metadata carries this token. The time it takes does not
@@ -73,6 +81,19 @@ impl Token {
                 "the token is not this coordinator's: it stands in the file `token` of the \
                  coordinator's state folder",
             ))
+        }
+    }
+}
+
+/// What a client puts on each of its calls: a token, or nothing where its certificate says who it is.
+#[derive(Clone, Debug, Default)]
+pub struct Bearer(pub Option<Token>);
+
+impl Interceptor for Bearer {
+    fn call(&mut self, request: Request<()>) -> Result<Request<()>, Status> {
+        match &mut self.0 {
+            Some(token) => token.call(request),
+            None => Ok(request),
         }
     }
 }

@@ -102,6 +102,7 @@ mod grpc {
             ErrorKind::DigestMismatch => Code::DataLoss,
             ErrorKind::NotFound | ErrorKind::AttemptDead => Code::NotFound,
             ErrorKind::Unauthenticated => Code::Unauthenticated,
+            ErrorKind::Forbidden => Code::PermissionDenied,
             ErrorKind::Limit => Code::ResourceExhausted,
             ErrorKind::WrongProtocol | ErrorKind::WrongRevision => Code::FailedPrecondition,
             ErrorKind::Conflict => Code::AlreadyExists,
@@ -145,7 +146,8 @@ mod grpc {
             };
             let kind = match status.code() {
                 Code::ResourceExhausted | Code::OutOfRange => ErrorKind::Limit,
-                Code::Unauthenticated | Code::PermissionDenied => ErrorKind::Unauthenticated,
+                Code::Unauthenticated => ErrorKind::Unauthenticated,
+                Code::PermissionDenied => ErrorKind::Forbidden,
                 Code::Unimplemented => ErrorKind::WrongProtocol,
                 Code::InvalidArgument => ErrorKind::BadRequest,
                 Code::NotFound => ErrorKind::NotFound,

@@ -9,6 +9,8 @@
 //! - [`place`]: the state folder's files through which the parts on one machine find each other.
 //! - [`version`]: which protocol versions two sides can speak.
 //! - `link` (feature `grpc`): the settings that both ends of a connection share.
+//! - `tls` (feature `grpc`): how a farm's parts know each other over a network.
+//! - `way` (feature `grpc`): how a coordinator is reached, on this machine or over a network.
 //!
 //! Generated types stop at the shells: neither core knows this crate.
 
@@ -21,7 +23,11 @@ pub mod failure;
 pub mod link;
 #[cfg(feature = "grpc")]
 pub mod place;
+#[cfg(feature = "grpc")]
+pub mod tls;
 pub mod version;
+#[cfg(feature = "grpc")]
+pub mod way;
 
 /// The messages and service stubs of `proto/flyby/v1`.
 #[allow(

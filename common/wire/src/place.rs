@@ -2,6 +2,7 @@
 //!
 //! The coordinator makes them; workers and users read them.
 
+use std::fs::{self, File, OpenOptions};
 use std::io;
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
@@ -16,6 +17,15 @@ pub const COORDINATOR_FILE: &str = "coordinator.json";
 /// The file with the coordinator's token, inside its state folder; mode 0600.
 pub const TOKEN_FILE: &str = "token";
 
+/// The file with the coordinator's certificate authority and its key, inside its state folder; mode 0600.
+pub const AUTHORITY_FILE: &str = "authority.pem";
+
+/// The file with the tokens for other machines, inside the coordinator's state folder; mode 0600.
+pub const TOKENS_FILE: &str = "tokens.json";
+
+/// The folder of certificates by which workers joined, inside the state folder.
+pub const JOINED_FOLDER: &str = "joined";
+
 /// The port that a coordinator listens on unless told otherwise.
 pub const DEFAULT_PORT: u16 = 7359;
 
@@ -25,7 +35,7 @@ const FILE_BYTES_MAX: u64 = 4096;
 /// A running coordinator, as its file says it.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
 pub struct Coordinator {
-    /// Where it listens.
+    /// Where it listens on this machine: a loopback address, for whoever finds it by this file.
     pub address: SocketAddr,
     /// Its process.
     pub pid: u32,
@@ -93,7 +103,7 @@ fn read(path: &Path) -> Result<Option<String>, NotFound> {
         path: path.to_owned(),
         source,
     };
-    let file = match std::fs::File::open(path) {
+    let file = match File::open(path) {
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
         file => file.map_err(unreadable)?,
     };
@@ -102,6 +112,29 @@ fn read(path: &Path) -> Result<Option<String>, NotFound> {
         .read_to_string(&mut text)
         .map_err(unreadable)?;
     Ok(Some(text))
+}
+
+/// Writes a small file so that it holds the old bytes or the new ones, whatever happens, and durably.
+pub fn replace(path: &Path, bytes: &[u8], mode: u32) -> io::Result<()> {
+    use std::io::Write as _;
+    use std::os::unix::fs::OpenOptionsExt as _;
+    let fresh = path.with_extension("new");
+    match fs::remove_file(&fresh) {
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    let mut file = OpenOptions::new()
+        .create_new(true)
+        .write(true)
+        .mode(mode)
+        .open(&fresh)?;
+    file.write_all(bytes)?;
+    file.sync_all()?;
+    fs::rename(&fresh, path)?;
+    match path.parent() {
+        Some(folder) => File::open(folder)?.sync_all(),
+        None => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -116,8 +149,8 @@ mod tests {
             Err(NotFound::NotRunning(_))
         ));
         assert!(matches!(token(state.path()), Err(NotFound::NoToken(_))));
-        std::fs::write(state.path().join(TOKEN_FILE), "hello").unwrap();
-        std::fs::write(state.path().join(COORDINATOR_FILE), "{}").unwrap();
+        fs::write(state.path().join(TOKEN_FILE), "hello").unwrap();
+        fs::write(state.path().join(COORDINATOR_FILE), "{}").unwrap();
         let said = coordinator(state.path()).unwrap_err().to_string();
         assert!(said.contains("missing field"), "{said}");
         assert!(

@@ -1,4 +1,4 @@
-//! The coordinator's only clock.
+//! The coordinator's only clock. Certificates and tokens alone ask the calendar itself, as those do who show them.
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 

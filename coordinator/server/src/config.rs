@@ -10,8 +10,13 @@ use model::{Epoch, Revision, Span};
 pub struct Config {
     /// The state folder; made if it is not there.
     pub state: PathBuf,
-    /// Where to listen; loopback only. Port 0 takes any free one.
+    /// Where to listen. Port 0 takes any free one. Where it is not loopback, loopback is listened on too, for what runs
+    /// on this machine.
     pub listen: SocketAddr,
+    /// Where other machines can reach it, each a host or an address with a port; empty: where it listens.
+    pub advertise: Vec<String>,
+    /// How long certificates count: its own, and those of workers that joined.
+    pub certificate_life: Span,
     /// The renderer revision whose pixels it takes.
     pub revision: Revision,
     /// This program's version, shown to users and written into frames.
@@ -53,6 +58,8 @@ impl Config {
         Self {
             state,
             listen: (Ipv4Addr::LOCALHOST, wire::place::DEFAULT_PORT).into(),
+            advertise: Vec::new(),
+            certificate_life: Span::from_secs(24 * 3600),
             revision,
             build: build.into(),
             heartbeat_interval: Span::from_secs(1),

@@ -5,6 +5,7 @@
 //!
 //! - `state`: the state folder, its lock, token and epoch.
 //! - `grpc`: messages in and out; here generated types begin and end.
+//! - `trust`: certificates, tokens, and the gate before every call.
 //! - `inbox`: submissions as they arrive, checked against their digests.
 //! - `storage`: a thread that writes blocks at their place, makes them durable and keeps the store, and one
 //!   that encodes finished images. `about`, `scene_files`: what else is kept of a job.
@@ -29,6 +30,7 @@ mod space;
 mod start;
 mod state;
 mod storage;
+mod trust;
 mod worker;
 
 pub use config::{Config, Limits};

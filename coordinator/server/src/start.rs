@@ -1,7 +1,7 @@
 //! Starting and stopping a coordinator.
 
 use std::io;
-use std::net::SocketAddr;
+use std::net::{Ipv4Addr, SocketAddr};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -20,6 +20,7 @@ use crate::input::{Input, News};
 use crate::shell::{Kept, Shell};
 use crate::state::{State, StateError};
 use crate::storage::Storage;
+use crate::trust::{Trust, acceptor, addresses};
 
 /// News that wait for the loop; whoever has more waits.
 const NEWS_MAX: usize = 64;
@@ -30,12 +31,6 @@ const STOP_TIMEOUT: Duration = Duration::from_secs(5);
 /// Why a coordinator did not start.
 #[derive(Debug, thiserror::Error)]
 pub enum StartError {
-    /// The address can be reached from other machines.
-    #[error(
-        "{0} can be reached from other machines, and there is no encryption yet: listen on \
-         127.0.0.1 or [::1]"
-    )]
-    NotLoopback(SocketAddr),
     /// The state folder cannot be used.
     #[error(transparent)]
     State(#[from] StateError),
@@ -66,6 +61,9 @@ pub enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// TLS cannot be set up.
+    #[error("cannot set up TLS with the certificate authority of the state folder")]
+    Tls(#[source] rustls::Error),
     /// The system refused a thread.
     #[error("cannot start a thread")]
     Thread(#[source] io::Error),
@@ -81,6 +79,7 @@ pub struct StoreBroken(String);
 #[derive(Debug)]
 pub struct Running {
     address: SocketAddr,
+    local: SocketAddr,
     epoch: Epoch,
     token: Token,
     inputs: mpsc::Sender<Input>,
@@ -95,19 +94,16 @@ pub struct Running {
 /// Answers once it listens; from then on it runs on the runtime that this is called on, until
 /// [`Running::run_until`] stops it.
 pub async fn start(config: Config) -> Result<Running, StartError> {
-    if !config.listen.ip().is_loopback() {
-        return Err(StartError::NotLoopback(config.listen));
-    }
     let config = Arc::new(config);
     let state = Arc::new(State::take(&config.state)?);
     let mut store = Sqlite::open(&state.store())?;
     let (kept, open) = Kept::read(&state, &mut store)?;
-    let listener = listen(config.listen).await?;
-    let address = listener.local_addr().map_err(|source| StartError::Listen {
-        address: config.listen,
-        source,
-    })?;
-    state.announce(address)?;
+    let trust = Arc::new(Trust::open(&state, config.certificate_life)?);
+    let listening = Listening::on(config.listen).await?;
+    let Listening { address, local, .. } = listening;
+    state.announce(local)?;
+    let connections =
+        acceptor::accept(listening.listeners, &trust.authority).map_err(StartError::Tls)?;
 
     let (inputs, taken) = mpsc::channel(config.limits.inputs_max);
     let (news, heard) = mpsc::channel(NEWS_MAX);
@@ -117,10 +113,11 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
     shell.recall(kept);
     let shell = tokio::spawn(shell.run(heard, taken));
-    let door = Arc::new(Door::new(inputs.clone(), config, state.clone()));
+    let addresses = addresses::of(&config.advertise, address);
+    let door = Door::new(inputs.clone(), config, state.clone(), trust, addresses);
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();
-    let server = tokio::spawn(grpc::serve(listener, token.clone(), door, async {
+    let server = tokio::spawn(grpc::serve(connections, Arc::new(door), async {
         let _ = stopped.await;
     }));
     tracing::info!(
@@ -131,6 +128,7 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     );
     Ok(Running {
         address,
+        local,
         epoch: state.epoch(),
         token,
         inputs,
@@ -138,6 +136,53 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
         stop,
         shell,
         server,
+    })
+}
+
+/// Where a coordinator listens.
+struct Listening {
+    listeners: Vec<TcpListener>,
+    /// Where it was told to.
+    address: SocketAddr,
+    /// Where it does on this machine.
+    local: SocketAddr,
+}
+
+impl Listening {
+    /// Listens there, and on loopback too: on the same port, or another where that is taken.
+    async fn on(wanted: SocketAddr) -> Result<Self, StartError> {
+        let listener = listen(wanted).await?;
+        let address = bound(&listener, wanted)?;
+        let loopback = |port| SocketAddr::from((Ipv4Addr::LOCALHOST, port));
+        if address.ip().is_loopback()
+            || address == SocketAddr::from((Ipv4Addr::UNSPECIFIED, address.port()))
+        {
+            let local = match address.ip().is_loopback() {
+                true => address,
+                false => loopback(address.port()),
+            };
+            return Ok(Self {
+                listeners: vec![listener],
+                address,
+                local,
+            });
+        }
+        let inner = match listen(loopback(address.port())).await {
+            Err(StartError::PortInUse(_)) => listen(loopback(0)).await?,
+            inner => inner?,
+        };
+        Ok(Self {
+            local: bound(&inner, loopback(0))?,
+            listeners: vec![listener, inner],
+            address,
+        })
+    }
+}
+
+fn bound(listener: &TcpListener, wanted: SocketAddr) -> Result<SocketAddr, StartError> {
+    listener.local_addr().map_err(|source| StartError::Listen {
+        address: wanted,
+        source,
     })
 }
 
@@ -154,6 +199,11 @@ impl Running {
     /// Where it listens.
     pub fn address(&self) -> SocketAddr {
         self.address
+    }
+
+    /// Where it listens on this machine, in the clear.
+    pub fn local(&self) -> SocketAddr {
+        self.local
     }
 
     /// How often a coordinator was started over its state folder.

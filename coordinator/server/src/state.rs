@@ -4,7 +4,9 @@
 //! lock               held while a coordinator runs
 //! token              64 hexadecimal digits, mode 0600
 //! epoch              how often a coordinator was started here
-//! coordinator.json   where the running one listens
+//! coordinator.json   where the running one listens on this machine
+//! authority.pem      the farm's certificate authority with its key, mode 0600
+//! tokens.json        tokens for other machines, without their secrets, mode 0600
 //! farm.sqlite        jobs, finished images, blocks of the others: what the `store` keeps
 //! jobs/arriving/     submissions, on the disk that they are to stay on; of this start only
 //! jobs/<job>/scene/    the scene and its assets
@@ -14,13 +16,13 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Write as _};
+use std::io;
 use std::os::unix::fs::{DirBuilderExt as _, OpenOptionsExt as _, PermissionsExt as _};
 use std::path::{Path, PathBuf};
 
 use model::{Epoch, ImageNumber, ImageRef, JobId};
 use wire::auth::Token;
-use wire::place::{COORDINATOR_FILE, Coordinator, TOKEN_FILE};
+use wire::place::{self, COORDINATOR_FILE, Coordinator, TOKEN_FILE};
 
 use crate::input::Frames;
 
@@ -36,13 +38,13 @@ pub enum StateError {
         .0.display()
     )]
     Locked(PathBuf),
-    /// Others may read the token.
+    /// Others may read a secret.
     #[error(
-        "the token {} has mode {mode:03o}, so that others can read it: `chmod 600` it, or remove it to get a new one",
+        "{} has mode {mode:03o}, so that others can read it: `chmod 600` it, or remove it to get a new one",
         path.display()
     )]
-    TokenMode {
-        /// The token's file.
+    Mode {
+        /// The file that holds it.
         path: PathBuf,
         /// Its mode.
         mode: u32,
@@ -117,6 +119,16 @@ impl State {
     /// Where submissions arrive.
     pub(crate) fn inbox(&self) -> PathBuf {
         self.root.join("jobs").join(ARRIVING)
+    }
+
+    /// The file of the certificate authority.
+    pub(crate) fn authority(&self) -> PathBuf {
+        self.root.join(place::AUTHORITY_FILE)
+    }
+
+    /// The file of tokens for other machines.
+    pub(crate) fn tokens(&self) -> PathBuf {
+        self.root.join(place::TOKENS_FILE)
     }
 
     /// The store's file.
@@ -300,10 +312,7 @@ fn token(root: &Path) -> Result<Token, StateError> {
         }
         metadata => metadata.map_err(io_error("look at", &path))?,
     };
-    let mode = metadata.permissions().mode() & 0o777;
-    if mode & 0o177 != 0 {
-        return Err(StateError::TokenMode { path, mode });
-    }
+    refuse_readers(&path, &metadata)?;
     let text = fs::read_to_string(&path).map_err(io_error("read", &path))?;
     text.parse().map_err(|_| StateError::Nonsense {
         path,
@@ -311,25 +320,31 @@ fn token(root: &Path) -> Result<Token, StateError> {
     })
 }
 
-/// Writes a small file so that it holds the old bytes or the new ones, whatever happens.
-fn replace(path: &Path, bytes: &[u8], mode: u32) -> Result<(), StateError> {
-    let fresh = path.with_extension("new");
-    let write = || {
-        remove_if_there(fs::remove_file(&fresh))?;
-        let mut file = OpenOptions::new()
-            .create_new(true)
-            .write(true)
-            .mode(mode)
-            .open(&fresh)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        fs::rename(&fresh, path)?;
-        match path.parent() {
-            Some(folder) => File::open(folder)?.sync_all(),
-            None => Ok(()),
-        }
-    };
-    write().map_err(io_error("write", path))
+/// A file with a secret, if it is there; refused where others can read it.
+pub(crate) fn secret(path: &Path) -> Result<Option<String>, StateError> {
+    match fs::metadata(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+        metadata => refuse_readers(path, &metadata.map_err(io_error("look at", path))?)?,
+    }
+    fs::read_to_string(path)
+        .map(Some)
+        .map_err(io_error("read", path))
+}
+
+fn refuse_readers(path: &Path, metadata: &fs::Metadata) -> Result<(), StateError> {
+    let mode = metadata.permissions().mode() & 0o777;
+    if mode & 0o177 == 0 {
+        return Ok(());
+    }
+    Err(StateError::Mode {
+        path: path.to_owned(),
+        mode,
+    })
+}
+
+/// [`place::replace`], with this crate's error.
+pub(crate) fn replace(path: &Path, bytes: &[u8], mode: u32) -> Result<(), StateError> {
+    place::replace(path, bytes, mode).map_err(io_error("write", path))
 }
 
 /// Makes a folder that only its owner may enter, and those above it.
@@ -358,7 +373,10 @@ fn remove_if_there(result: io::Result<()>) -> io::Result<()> {
     }
 }
 
-fn io_error(attempted: &'static str, path: &Path) -> impl FnOnce(io::Error) -> StateError {
+pub(crate) fn io_error(
+    attempted: &'static str,
+    path: &Path,
+) -> impl FnOnce(io::Error) -> StateError {
     let path = path.to_owned();
     move |source| StateError::Io {
         attempted,

@@ -1,20 +1,18 @@
 //! What a worker is started with, and why one does not start.
 
 use std::io;
-use std::net::SocketAddr;
 use std::num::NonZeroU32;
 use std::path::PathBuf;
 
 use model::Span;
-use wire::auth::Token;
+
+use crate::entry::Entry;
 
 /// What a worker is started with. None of it changes a pixel.
 #[derive(Clone, Debug)]
 pub struct Config {
-    /// Where the coordinator listens.
-    pub coordinator: SocketAddr,
-    /// The coordinator's token.
-    pub token: Token,
+    /// How it gets to the coordinator.
+    pub entry: Entry,
     /// What the worker calls itself, 1 to 200 bytes.
     pub name: String,
     /// Render threads; each renders one tile at a time.
@@ -35,15 +33,9 @@ pub struct Config {
 
 impl Config {
     /// A worker of so many threads, with the usual settings.
-    pub fn new(
-        coordinator: SocketAddr,
-        token: Token,
-        name: impl Into<String>,
-        threads: NonZeroU32,
-    ) -> Self {
+    pub fn new(entry: Entry, name: impl Into<String>, threads: NonZeroU32) -> Self {
         Self {
-            coordinator,
-            token,
+            entry,
             name: name.into(),
             threads,
             ahead: None,

@@ -3,7 +3,7 @@
 //! A link is one task. It reports what it hears to the loop under its number, and ends
 //! when either stream does; dropping [`Link`] ends it from this side.
 
-use std::net::SocketAddr;
+use std::sync::Arc;
 use std::time::Duration;
 
 use model::{Epoch, Span, WorkerId};
@@ -12,11 +12,11 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Streaming;
-use wire::auth::Token;
 use wire::convert;
 use wire::proto::{self, ErrorKind, control_down, control_up, deliver_down, deliver_up};
 use wire::{Failure, link};
 
+use crate::entry::Access;
 use crate::input::{Clients, Input, LinkNumber};
 
 /// Messages of the control stream that wait to be sent.
@@ -45,18 +45,13 @@ impl Link {
     /// Opens both connections; the loop hears [`Input::Dialled`] or [`Input::Lost`].
     pub(crate) fn dial(
         number: LinkNumber,
-        coordinator: SocketAddr,
-        token: Token,
+        access: Arc<Access>,
         inputs: mpsc::Sender<Input>,
     ) -> Self {
         let task = tokio::spawn(async move {
-            let open = || link::workers(coordinator, token.clone());
-            let input = match tokio::try_join!(open(), open()) {
-                Ok((control, delivery)) => {
-                    let clients = Clients { control, delivery };
-                    Input::Dialled(number, Box::new(clients))
-                }
-                Err(error) => Input::Lost(number, unreachable(coordinator, &error)),
+            let input = match open(&access).await {
+                Ok(clients) => Input::Dialled(number, Box::new(clients)),
+                Err(failure) => Input::Lost(number, failure),
             };
             let _ = inputs.send(input).await;
         });
@@ -270,15 +265,8 @@ fn strange(what: &str) -> Failure {
     )
 }
 
-fn unreachable(coordinator: SocketAddr, error: &tonic::transport::Error) -> Failure {
-    let mut words = format!("no coordinator answers at {coordinator}");
-    let mut cause = std::error::Error::source(error);
-    while let Some(error) = cause {
-        let text = error.to_string();
-        if !words.contains(&text) {
-            words = format!("{words}: {text}");
-        }
-        cause = error.source();
-    }
-    Failure::later(ErrorKind::Unspecified, words)
+async fn open(access: &Access) -> Result<Clients, Failure> {
+    let way = access.way().await?;
+    let (control, delivery) = tokio::try_join!(link::workers(&way), link::workers(&way))?;
+    Ok(Clients { control, delivery })
 }

@@ -17,6 +17,7 @@ use wire::proto::{Delivery, ErrorKind, control_down, deliver_down};
 use wire::{BadMessage, Failure, convert};
 
 use crate::config::{Config, RunError};
+use crate::entry::Access;
 use crate::identity;
 use crate::images::Images;
 use crate::input::{Clients, Input, LinkNumber, Rendered};
@@ -49,6 +50,8 @@ pub async fn run(
 ) -> Result<ExitReason, RunError> {
     let (inputs, mut taken) = mpsc::channel(INPUTS_MAX);
     let mut shell = Shell::new(config, painter, inputs)?;
+    let (access, fetching) = (shell.access.clone(), shell.fetching.clone());
+    let renewing = tokio::spawn(async move { access.renew(&fetching).await });
     shell.feed(Event::Started).await;
     let mut heard = true;
     let mut leave_at = shell.leave_at;
@@ -71,6 +74,7 @@ pub async fn run(
         }
     }
     drop(taken);
+    renewing.abort();
     Ok(shell.end().await)
 }
 
@@ -81,6 +85,7 @@ struct Shell {
     /// When it leaves by itself.
     leave_at: Option<Instant>,
     config: Config,
+    access: Arc<Access>,
     worker: WorkerId,
     painter: Arc<dyn Painter>,
     pool: Pool,
@@ -125,6 +130,7 @@ impl Shell {
             session: Session::new(settings),
             origin,
             leave_at: config.time_limit.map(|limit| origin + useful(limit)),
+            access: Arc::new(Access::new(&config.entry)?),
             config,
             painter,
             inputs,
@@ -179,7 +185,7 @@ impl Shell {
                 self.feed(Event::Dialled).await;
             }
             Input::Connected(number, welcome) if self.is_newest(number) => {
-                tracing::info!(coordinator = %self.config.coordinator, epoch = welcome.epoch.0, "connected");
+                tracing::info!(coordinator = %self.config.entry, epoch = welcome.epoch.0, "connected");
                 self.feed(Event::Connected(welcome)).await;
             }
             Input::Control(number, message) if self.is_newest(number) => {

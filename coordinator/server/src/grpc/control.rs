@@ -14,6 +14,7 @@ use wire::{BadMessage, Failure, convert};
 
 use super::{Door, HELLO_TIMEOUT, labels};
 use crate::input::{AboutWorker, Greeting, Input, Link};
+use crate::trust::gate::Who;
 
 /// Most attempts that one message may name.
 const ATTEMPTS_MAX: usize = 65_536;
@@ -32,6 +33,7 @@ const SENTENCE_BYTES_MAX: usize = 2_000;
 /// The loop answers on `down`: a welcome, or why not.
 pub(super) async fn open(
     door: &Door,
+    who: Who,
     mut up: Streaming<proto::ControlUp>,
     down: mpsc::Sender<Result<proto::ControlDown, Status>>,
 ) -> Result<(), Failure> {
@@ -60,13 +62,28 @@ pub(super) async fn open(
     let (id, greeting) = (link.id, greeting(hello, link)?);
     let worker = greeting.worker;
     door.feed(Input::Hello(Box::new(greeting))).await?;
-    tokio::spawn(listen(door.inputs.clone(), worker, id, up, dead));
+    let (inputs, trust) = (door.inputs.clone(), door.trust.clone());
+    tokio::spawn(async move {
+        tokio::select! {
+            () = listen(&inputs, worker, id, up, dead) => {}
+            () = trust.revoked(who) => {
+                tracing::info!(%worker, "its token is revoked: the worker's link is ended");
+            }
+        }
+        let closed = Event::LinkClosed { worker, link: id };
+        let closed = Input::Said {
+            worker,
+            link: id,
+            event: closed,
+        };
+        let _ = inputs.send(closed).await;
+    });
     Ok(())
 }
 
 /// Hands everything that a worker says to the loop, until its stream ends.
 async fn listen(
-    inputs: mpsc::Sender<Input>,
+    inputs: &mpsc::Sender<Input>,
     worker: WorkerId,
     link: LinkId,
     mut up: Streaming<proto::ControlUp>,
@@ -101,7 +118,6 @@ async fn listen(
             }
         }
     }
-    let _ = inputs.send(say(Event::LinkClosed { worker, link })).await;
 }
 
 /// A hello, checked.

@@ -15,6 +15,7 @@ use wire::{Failure, convert};
 
 use super::{Door, HELLO_TIMEOUT};
 use crate::input::{Arrived, Input, Link};
+use crate::trust::gate::Who;
 
 /// Most counters beside one block.
 const COUNTERS_MAX: usize = 32;
@@ -24,6 +25,7 @@ type Down = mpsc::Sender<Result<proto::DeliverDown, Status>>;
 /// Hears whose stream it is, ties it to the worker, and takes its blocks from then on.
 pub(super) async fn open(
     door: &Door,
+    who: Who,
     mut up: Streaming<proto::DeliverUp>,
     down: Down,
 ) -> Result<(), Failure> {
@@ -66,7 +68,18 @@ pub(super) async fn open(
         // Only a weak end: the stream must end when the loop drops its own.
         down: down.downgrade(),
     };
-    tokio::spawn(listener.listen(up, dead));
+    let trust = door.trust.clone();
+    tokio::spawn(async move {
+        tokio::select! {
+            () = listener.listen(up, dead) => {}
+            () = trust.revoked(who) => {}
+        }
+        let closed = Input::DeliveryClosed {
+            worker: listener.worker,
+            link: listener.link,
+        };
+        let _ = listener.inputs.send(closed).await;
+    });
     Ok(())
 }
 
@@ -79,7 +92,7 @@ struct Listener {
 }
 
 impl Listener {
-    async fn listen(self, mut up: Streaming<proto::DeliverUp>, mut dead: oneshot::Receiver<()>) {
+    async fn listen(&self, mut up: Streaming<proto::DeliverUp>, mut dead: oneshot::Receiver<()>) {
         loop {
             let said = tokio::select! {
                 said = up.message() => said,
@@ -99,11 +112,6 @@ impl Listener {
                 break;
             }
         }
-        let closed = Input::DeliveryClosed {
-            worker: self.worker,
-            link: self.link,
-        };
-        let _ = self.inputs.send(closed).await;
     }
 
     /// Hands a block to the loop, or answers what is wrong with it. An error says that

@@ -7,6 +7,8 @@ mod bytes;
 mod clean;
 mod control;
 mod delivery;
+mod joining;
+mod tokens;
 mod user;
 mod workers;
 
@@ -17,15 +19,13 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use sched::LinkId;
-use tokio::net::TcpListener;
 use tokio::sync::{Semaphore, mpsc, oneshot};
-use tonic::service::interceptor::InterceptedService;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::Request;
 use tonic::transport::Server;
-use tonic::transport::server::TcpIncoming;
-use tonic::{Request, Status};
-use wire::auth::Token;
 use wire::link;
 use wire::proto::farm_server::FarmServer;
+use wire::proto::joining_server::JoiningServer;
 use wire::proto::workers_server::WorkersServer;
 use wire::proto::{self, ErrorKind};
 use wire::{BadMessage, Failure, convert};
@@ -35,12 +35,18 @@ use crate::inbox::Inbox;
 use crate::input::{Input, Reply};
 use crate::space::Space;
 use crate::state::State;
+use crate::trust::Trust;
+use crate::trust::acceptor::Connection;
+use crate::trust::gate::{Gated, Who};
 
 /// Most calls at the same time on one connection.
 const STREAMS_MAX: u32 = 256;
 
 /// Most bytes of a label.
 const LABEL_BYTES_MAX: usize = 64;
+
+/// Largest message of somebody whom nobody knows yet.
+const JOINING_BYTES_MAX: usize = 4_096;
 
 /// How long whoever opens a stream may take to say who it is.
 const HELLO_TIMEOUT: Duration = Duration::from_secs(10);
@@ -51,6 +57,10 @@ pub(crate) struct Door {
     inputs: mpsc::Sender<Input>,
     config: Arc<Config>,
     state: Arc<State>,
+    trust: Arc<Trust>,
+    /// Where other machines can reach it.
+    addresses: Vec<String>,
+    loopback_only: bool,
     inbox: Inbox,
     submissions: Arc<Semaphore>,
     blocks: Arc<Semaphore>,
@@ -59,7 +69,13 @@ pub(crate) struct Door {
 }
 
 impl Door {
-    pub(crate) fn new(inputs: mpsc::Sender<Input>, config: Arc<Config>, state: Arc<State>) -> Self {
+    pub(crate) fn new(
+        inputs: mpsc::Sender<Input>,
+        config: Arc<Config>,
+        state: Arc<State>,
+        trust: Arc<Trust>,
+        addresses: Vec<String>,
+    ) -> Self {
         let limits = &config.limits;
         Self {
             inputs,
@@ -68,8 +84,11 @@ impl Door {
             blocks: Arc::new(Semaphore::new(limits.blocks_in_flight_max)),
             watchers: Arc::new(Semaphore::new(limits.watchers_max)),
             next_link: AtomicU64::new(1),
+            loopback_only: config.listen.ip().is_loopback(),
             config,
             state,
+            trust,
+            addresses,
         }
     }
 
@@ -101,32 +120,37 @@ fn stopping() -> Failure {
     Failure::later(ErrorKind::Stopping, "the coordinator is stopping")
 }
 
+/// Who asks, as the gate found out.
+fn who<T>(request: &Request<T>) -> Who {
+    // Nothing passes the gate without.
+    let who = request.extensions().get().copied();
+    who.unwrap_or(Who::Stranger)
+}
+
 /// Serves until `stop` is there and every stream has ended.
 pub(crate) async fn serve(
-    listener: TcpListener,
-    token: Token,
+    connections: ReceiverStream<std::io::Result<Connection>>,
     door: Arc<Door>,
     stop: impl Future<Output = ()>,
 ) -> Result<(), tonic::transport::Error> {
-    let check = move |request: Request<()>| match token.check(request.metadata()) {
-        Ok(()) => Ok(request),
-        Err(failure) => Err(Status::from(failure)),
-    };
+    let trust = door.trust.clone();
     let farm = FarmServer::from_arc(door.clone())
         .max_decoding_message_size(link::MESSAGE_BYTES_MAX)
         .max_encoding_message_size(link::MESSAGE_BYTES_MAX);
-    let workers = WorkersServer::from_arc(door)
+    let workers = WorkersServer::from_arc(door.clone())
         .max_decoding_message_size(link::MESSAGE_BYTES_MAX)
         .max_encoding_message_size(link::MESSAGE_BYTES_MAX);
+    let joining = JoiningServer::from_arc(door).max_decoding_message_size(JOINING_BYTES_MAX);
     Server::builder()
         .initial_connection_window_size(link::CONNECTION_WINDOW_BYTES)
         .initial_stream_window_size(link::STREAM_WINDOW_BYTES)
         .max_concurrent_streams(STREAMS_MAX)
         .http2_keepalive_interval(Some(link::KEEPALIVE_INTERVAL))
         .http2_keepalive_timeout(Some(link::KEEPALIVE_TIMEOUT))
-        .add_service(InterceptedService::new(farm, check.clone()))
-        .add_service(InterceptedService::new(workers, check))
-        .serve_with_incoming_shutdown(TcpIncoming::from(listener).with_nodelay(Some(true)), stop)
+        .add_service(Gated::new(farm, trust.clone()))
+        .add_service(Gated::new(workers, trust.clone()))
+        .add_service(Gated::new(joining, trust))
+        .serve_with_incoming_shutdown(connections, stop)
         .await
 }
 

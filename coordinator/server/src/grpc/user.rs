@@ -206,11 +206,34 @@ impl Farm for Door {
     async fn info(&self, _: Request<proto::InfoRequest>) -> Answer<proto::FarmInfo> {
         let info = self.ask(|reply| Input::Ask(Query::Info(reply))).await?;
         let space = self.space().await;
+        let until = self.trust.authority.own_until();
         Ok(Response::new(proto::FarmInfo {
+            certificate_until_unix_ms: until.saturating_mul(1_000),
             disk_free_bytes: space.map(|space| space.free),
             disk_bytes: space.map(|space| space.all),
             ..info
         }))
+    }
+
+    async fn create_token(
+        &self,
+        request: Request<proto::CreateTokenRequest>,
+    ) -> Answer<proto::CreatedToken> {
+        let created = super::tokens::create(self, request.into_inner()).await?;
+        Ok(Response::new(created))
+    }
+
+    async fn list_tokens(&self, _: Request<proto::ListTokensRequest>) -> Answer<proto::TokenList> {
+        let tokens = self.trust.tokens.all();
+        Ok(Response::new(proto::TokenList { tokens }))
+    }
+
+    async fn revoke_token(
+        &self,
+        request: Request<proto::RevokeTokenRequest>,
+    ) -> Answer<proto::Token> {
+        let revoked = super::tokens::revoke(self, request.get_ref().id).await?;
+        Ok(Response::new(revoked))
     }
 }
 

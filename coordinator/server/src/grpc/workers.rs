@@ -8,7 +8,7 @@ use wire::proto;
 use wire::proto::workers_server::Workers;
 
 use super::bytes::{Chunks, send_file};
-use super::{Door, control, delivery};
+use super::{Door, control, delivery, who};
 use crate::input::{Input, Query, Wanted};
 
 #[tonic::async_trait]
@@ -20,7 +20,8 @@ impl Workers for Door {
         request: Request<Streaming<proto::ControlUp>>,
     ) -> Result<Response<Self::ControlStream>, Status> {
         let (down, messages) = mpsc::channel(self.config.limits.worker_messages_max);
-        control::open(self, request.into_inner(), down).await?;
+        let who = who(&request);
+        control::open(self, who, request.into_inner(), down).await?;
         Ok(Response::new(ReceiverStream::new(messages)))
     }
 
@@ -31,7 +32,8 @@ impl Workers for Door {
         request: Request<Streaming<proto::DeliverUp>>,
     ) -> Result<Response<Self::DeliverStream>, Status> {
         let (down, messages) = mpsc::channel(self.config.limits.worker_messages_max);
-        delivery::open(self, request.into_inner(), down).await?;
+        let who = who(&request);
+        delivery::open(self, who, request.into_inner(), down).await?;
         Ok(Response::new(ReceiverStream::new(messages)))
     }
 

@@ -247,9 +247,10 @@ impl Shell {
             undecided: self.sched.jobs().map(|job| job.undecided).sum(),
             now_unix_ms: self.unix_ms_now(),
             state: self.state.root().display().to_string(),
-            // The disk is asked by who has the time.
+            // These are asked for by who has the time.
             disk_free_bytes: None,
             disk_bytes: None,
+            certificate_until_unix_ms: 0,
             trouble: self.troubles.values().next().cloned().unwrap_or_default(),
         }
     }

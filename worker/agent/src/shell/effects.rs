@@ -8,7 +8,7 @@ use session::{Effect, Event};
 use tokio::sync::{mpsc, watch};
 use wire::failure::Retry;
 use wire::link::Workers;
-use wire::proto::{self, control_up};
+use wire::proto::{self, ErrorKind, control_up};
 
 use super::Shell;
 use crate::input::{Input, LinkNumber, Rendered};
@@ -80,12 +80,7 @@ impl Shell {
         let number = LinkNumber(self.next_link);
         self.next_link += 1;
         self.clients = None;
-        self.link = Some(Link::dial(
-            number,
-            self.config.coordinator,
-            self.config.token.clone(),
-            self.inputs.clone(),
-        ));
+        self.link = Some(Link::dial(number, self.access.clone(), self.inputs.clone()));
     }
 
     fn close(&mut self) {
@@ -161,7 +156,11 @@ async fn load(
         if let Some(mut way) = way {
             match scenes.scene(lease.scene, &mut way).await {
                 Ok(scene) => break Input::Ready(Box::new(lease), scene),
-                Err(failure) if failure.retry == Retry::Never => {
+                // A certificate that was not renewed in time is not the tile's fault.
+                Err(failure)
+                    if failure.retry == Retry::Never
+                        && failure.kind != ErrorKind::Unauthenticated =>
+                {
                     break Input::Rendered(Rendered::Failed(lease.attempt, failure.sentence));
                 }
                 Err(failure) => {

@@ -18,6 +18,7 @@ use tokio::task::JoinHandle;
 use wire::Failure;
 use wire::auth::Token;
 use wire::proto::{self, job_update::Update, submit_part::Part};
+use wire::way::Way;
 
 use crate::painter;
 
@@ -86,13 +87,13 @@ impl Farm {
     }
 
     pub(crate) async fn client(&self) -> wire::link::Farm {
-        wire::link::farm(self.address, self.token.clone())
+        wire::link::farm(&Way::local(self.address, self.token.clone()))
             .await
             .unwrap()
     }
 
     pub(crate) async fn worker_client(&self) -> wire::link::Workers {
-        wire::link::workers(self.address, self.token.clone())
+        wire::link::workers(&Way::local(self.address, self.token.clone()))
             .await
             .unwrap()
     }
@@ -208,7 +209,11 @@ impl Worker {
         painter: impl Painter,
     ) -> Self {
         let threads = NonZeroU32::new(threads).unwrap();
-        let config = agent::Config::new(address, token.clone(), "test worker", threads);
+        let entry = agent::Entry::Local {
+            coordinator: address,
+            token: token.clone(),
+        };
+        let config = agent::Config::new(entry, "test worker", threads);
         let (asks, heard) = mpsc::channel(4);
         let run =
             tokio::spawn(

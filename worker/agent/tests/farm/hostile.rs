@@ -53,7 +53,9 @@ fn sender_with<T>(first: T) -> (mpsc::Sender<T>, ReceiverStream<T>) {
 async fn a_wrong_token_opens_nothing() {
     let farm = Farm::start().await;
     let wrong = Token::from_random([1; 32]);
-    let mut client = wire::link::farm(farm.address, wrong.clone()).await.unwrap();
+    let mut client = wire::link::farm(&wire::way::Way::local(farm.address, wrong.clone()))
+        .await
+        .unwrap();
     let refused = client.info(proto::InfoRequest {}).await.unwrap_err();
     assert_eq!(Failure::from(refused).kind, ErrorKind::Unauthenticated);
     let worker = Worker::start(farm.address, &wrong, 1, Ramp::default());
