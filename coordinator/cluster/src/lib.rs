@@ -10,7 +10,7 @@
 //! - `template`: the scripts of `deploy/`, and how values are put into them.
 //! - [`camp`]: what one farm has at one site.
 //! - [`survey`]: what a site is like, for `flyby site check`; [`install`]: the program brought there.
-
+//! - [`pilot`]: how many allocations a site should have, a function of what was seen.
 //!
 //! `tests/clusters` shows it whole on real engines.
 
@@ -18,7 +18,7 @@ pub mod camp;
 mod error;
 mod gridengine;
 pub mod install;
-
+pub mod pilot;
 mod processes;
 pub mod queue;
 pub mod sites;
