@@ -6,20 +6,22 @@ use clap::{Args, Subcommand};
 use cluster::camp::{Camp, farm_of};
 use cluster::{ClusterError, Site, Sites, SitesError, install, survey};
 use miette::Severity;
+use wire::proto::{ListSitesRequest, SiteStatus};
 
 use crate::caret::Caret;
 use crate::error::{Ending, Error};
-use crate::options::Context;
+use crate::farm::link::{block_on, refused};
+use crate::options::{Context, FarmOptions};
 use crate::output;
 use crate::site::check::{Check, Checks, Verdict};
-use crate::site::view::{Cleaned, Installed, Listed};
+use crate::site::view::{Cleaned, Installed, Listed, SiteView};
 
 /// The file of sites inside the state folder.
 const SITES_FILE: &str = "sites.toml";
 
 #[derive(Subcommand, Debug)]
 pub(crate) enum SiteCommand {
-    /// Lists the sites of the file.
+    /// Lists the sites as the running coordinator sees them; those of the file where none runs or one is named.
     List(List),
     /// Logs in to sites and says what they are like: queue, limits, clock, program (exit code 1 if something is wrong).
     Check(CheckOptions),
@@ -41,6 +43,9 @@ struct SitesOptions {
 pub(crate) struct List {
     #[command(flatten)]
     file: SitesOptions,
+
+    #[command(flatten)]
+    farm: FarmOptions,
 }
 
 #[derive(Args, Debug)]
@@ -152,9 +157,37 @@ fn camp(context: &Context, site: Site) -> Result<Camp, Error> {
 }
 
 fn list(context: &Context, options: &List) -> Result<Ending, Error> {
-    let sites = options.file.read(context)?;
-    output::print(context.output, &Listed::from(&sites))?;
+    let seen = match options.file.sites {
+        None => block_on(seen(context, &options.farm))?,
+        Some(_) => Vec::new(),
+    };
+    let sites = match seen.is_empty() {
+        true => options
+            .file
+            .read(context)?
+            .0
+            .iter()
+            .map(SiteView::from)
+            .collect(),
+        false => seen.into_iter().map(SiteView::from).collect(),
+    };
+    output::print(context.output, &Listed { sites })?;
     Ok(Ending::Done)
+}
+
+/// What the coordinator says of its sites; nothing where none runs.
+async fn seen(context: &Context, options: &FarmOptions) -> Result<Vec<SiteStatus>, Error> {
+    let runs = options.coordinator.is_some()
+        || context
+            .state()
+            .is_ok_and(|state| wire::place::coordinator(&state).is_ok());
+    if !runs {
+        return Ok(Vec::new());
+    }
+    let mut farm = context.connect(options).await?;
+    let sites = farm.list_sites(ListSitesRequest {}).await;
+    let sites = sites.map_err(|status| refused("cannot list the sites", status))?;
+    Ok(sites.into_inner().sites)
 }
 
 fn check(context: &Context, options: &CheckOptions) -> Result<Ending, Error> {

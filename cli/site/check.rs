@@ -266,7 +266,7 @@ fn of_program(site: &Site, program: &Program) -> Finding {
 
 fn no_program(site: &Site, error: &ClusterError) -> Finding {
     match error {
-        ClusterError::Missing { .. } => Finding::bad(
+        ClusterError::Program { .. } => Finding::bad(
             "program",
             format!("{} is not there", site.program),
             format!("`flyby site install {}`", site.name),

@@ -2,9 +2,10 @@
 
 use std::io::{self, Write};
 
+use cluster::Site;
 use cluster::survey::Program;
-use cluster::{Site, Sites};
 use serde::Serialize;
+use wire::proto::SiteStatus;
 
 use crate::output::{Report, columns};
 
@@ -12,59 +13,115 @@ use crate::output::{Report, columns};
 #[derive(Serialize)]
 pub(crate) struct Listed {
     /// By name.
-    sites: Vec<ListedSite>,
+    pub(crate) sites: Vec<SiteView>,
 }
 
-/// A site of the file.
+/// A site, as the running coordinator last saw it, or as the file says it where none runs.
 #[derive(Serialize)]
-struct ListedSite {
+pub(crate) struct SiteView {
     /// Its name.
     name: String,
     /// `slurm`, `gridengine`, `ssh` or `local`.
-    kind: &'static str,
-    /// `pilot`, `poll` or `auto`.
-    mode: &'static str,
-    /// Where ssh logs in; null for this machine.
+    kind: String,
+    /// `pilot` or `poll`; `auto` until that is known.
+    mode: String,
+    /// Where ssh logs in; null for this machine, or the coordinator's.
     address: Option<String>,
-    /// Render threads of an allocation.
-    threads: u32,
-    /// Most allocations at a time; null where there is no limit.
-    max_running: Option<u32>,
+    /// What a coordinator saw there; null where none runs.
+    seen: Option<Seen>,
 }
 
-impl From<&Sites> for Listed {
-    fn from(sites: &Sites) -> Self {
-        let listed = |site: &Site| ListedSite {
-            name: site.name.clone(),
-            kind: site.kind.name(),
-            mode: site.mode.name(),
-            address: site.address.clone(),
-            threads: site.threads,
-            max_running: site.max_running,
-        };
+/// What a coordinator saw at a site.
+#[derive(Serialize)]
+struct Seen {
+    /// Allocations that run.
+    running: u32,
+    /// Allocations that wait in the queue.
+    waiting: u32,
+    /// Allocations that there should be, those among them.
+    wanted: u32,
+    /// What is wrong there, as the queue said it, and what to change; null where nothing is.
+    trouble: Option<String>,
+    /// When its queue was asked last, milliseconds since 1970 (UTC); null is never.
+    asked_unix_ms: Option<u64>,
+}
+
+impl From<&Site> for SiteView {
+    fn from(site: &Site) -> Self {
         Self {
-            sites: sites.0.iter().map(listed).collect(),
+            name: site.name.clone(),
+            kind: site.kind.name().to_owned(),
+            mode: site.mode.name().to_owned(),
+            address: site.address.clone(),
+            seen: None,
         }
+    }
+}
+
+impl From<SiteStatus> for SiteView {
+    fn from(site: SiteStatus) -> Self {
+        let said = |text: String| Some(text).filter(|text| !text.is_empty());
+        Self {
+            name: site.name,
+            kind: site.kind,
+            mode: site.mode,
+            address: said(site.address),
+            seen: Some(Seen {
+                running: site.running,
+                waiting: site.waiting,
+                wanted: site.wanted,
+                trouble: said(site.trouble),
+                asked_unix_ms: Some(site.asked_unix_ms).filter(|&asked| asked > 0),
+            }),
+        }
+    }
+}
+
+impl SiteView {
+    /// One line for `farm status`.
+    pub(crate) fn line(&self) -> String {
+        match &self.seen {
+            Some(seen) => format!(
+                "{}: {} allocations run, {} wait, {} wanted",
+                self.name, seen.running, seen.waiting, seen.wanted
+            ),
+            None => self.name.clone(),
+        }
+    }
+
+    /// What is wrong there.
+    pub(crate) fn trouble(&self) -> Option<&str> {
+        self.seen.as_ref()?.trouble.as_deref()
     }
 }
 
 impl Report for Listed {
     fn table(&self, out: &mut dyn Write) -> io::Result<()> {
-        let mut table = columns(["site", "kind", "mode", "address", "threads", "most"]);
+        let mut table = columns(["site", "kind", "mode", "address", "run", "wait", "wanted"]);
         for site in &self.sites {
+            let count = |of: &dyn Fn(&Seen) -> u32| {
+                let seen = site.seen.as_ref();
+                seen.map_or_else(|| "-".to_owned(), |seen| of(seen).to_string())
+            };
             table.add_row([
                 site.name.clone(),
-                site.kind.to_owned(),
-                site.mode.to_owned(),
+                site.kind.clone(),
+                site.mode.clone(),
                 site.address
                     .clone()
                     .unwrap_or_else(|| "this machine".to_owned()),
-                site.threads.to_string(),
-                site.max_running
-                    .map_or_else(|| "any".to_owned(), |most| most.to_string()),
+                count(&|seen| seen.running),
+                count(&|seen| seen.waiting),
+                count(&|seen| seen.wanted),
             ]);
         }
-        writeln!(out, "{}", table.trim_fmt())
+        writeln!(out, "{}", table.trim_fmt())?;
+        for site in &self.sites {
+            if let Some(trouble) = site.trouble() {
+                writeln!(out, "{}: {trouble}", site.name)?;
+            }
+        }
+        Ok(())
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {

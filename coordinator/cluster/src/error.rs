@@ -73,6 +73,16 @@ pub enum ClusterError {
         /// What the shell said.
         said: String,
     },
+    /// The program there cannot be used.
+    #[error("the program {path} at site {site} cannot be used: {what}")]
+    Program {
+        /// Its path there.
+        path: String,
+        /// The site.
+        site: String,
+        /// What is wrong with it.
+        what: String,
+    },
     /// The queue refused.
     #[error("{attempt} was refused: {said}")]
     Refused {
@@ -142,6 +152,7 @@ impl ClusterError {
             Self::Missing { .. } => {
                 "name what makes it known in the site's `setup`, such as \"module load slurm\""
             }
+            Self::Program { .. } => "bring this one there: `flyby site install SITE`",
             Self::Refused { refusal, .. } => refusal.next(),
             Self::Nonsense { .. } => {
                 "run the command there by hand; if it prints what it should, this is a mistake of this program"

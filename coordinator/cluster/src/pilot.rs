@@ -5,6 +5,7 @@
 //! counts; no more is submitted than the limits allow; after a refusal or a failure nothing is submitted for a while,
 //! longer each time.
 
+mod script;
 #[cfg(test)]
 mod tests;
 
@@ -14,6 +15,8 @@ use model::{Span, Timestamp};
 
 use crate::queue::{Task, TaskId, TaskState};
 use crate::sites::Cancelled;
+
+pub use script::{script, token_file};
 
 /// Most allocations of a site that sets no limit.
 const ALLOCATIONS_MAX: u32 = 1_000;
@@ -97,21 +100,23 @@ pub struct Standing {
 pub struct Pilot {
     settings: Settings,
     number: u64,
-    /// Allocations that have not been seen to end, and their arrays' names.
-    open: BTreeMap<TaskId, Open>,
+    /// Allocations that have not been seen to end.
+    open: BTreeMap<TaskId, Shown>,
     /// Those that were deleted from here.
     deleted: BTreeSet<TaskId>,
     failures: u32,
     quiet_until: Timestamp,
     stopped: bool,
     standing: Standing,
+    /// The allocation that failed last, and of which nobody has read what it said.
+    failed: Option<(String, u32)>,
 }
 
-#[derive(Clone, Debug)]
-struct Open {
-    name: String,
-    /// How often the queue did not show it.
-    missing: u32,
+/// Whether the queue still shows an allocation.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Shown {
+    Yes,
+    No,
 }
 
 /// How an allocation ended, as far as it matters.
@@ -133,6 +138,20 @@ impl Pilot {
             quiet_until: Timestamp(0),
             stopped: false,
             standing: Standing::default(),
+            failed: None,
+        }
+    }
+
+    /// The array and the number of an allocation that failed, once: what it wrote may say why.
+    pub fn take_failed(&mut self) -> Option<(String, u32)> {
+        self.failed.take()
+    }
+
+    /// What an allocation that failed had to say.
+    pub fn has_said(&mut self, words: &str) {
+        if let Some(trouble) = self.standing.trouble.as_mut().filter(|_| !words.is_empty()) {
+            trouble.push_str(": ");
+            trouble.push_str(words);
         }
     }
 
@@ -187,13 +206,10 @@ impl Pilot {
     }
 
     /// An array was submitted.
-    pub fn submitted(&mut self, name: &str, array: &TaskId, tasks: u32) {
+    pub fn submitted(&mut self, array: &TaskId, tasks: u32) {
         for task in 1..=tasks {
-            let open = Open {
-                name: name.to_owned(),
-                missing: 0,
-            };
-            self.open.insert(TaskId::task(&array.array, task), open);
+            self.open
+                .insert(TaskId::task(&array.array, task), Shown::Yes);
         }
         self.standing.trouble = None;
         self.standing.waiting = self.standing.waiting.saturating_add(tasks);
@@ -212,10 +228,12 @@ impl Pilot {
             }
         }
         // Nobody knows what became of the others: they are gone, which is all that matters.
-        self.open.retain(|id, open| {
+        self.open.retain(|id, shown| {
             let asked = arrays.iter().any(|array| array.array == id.array);
-            !(asked && open.missing > 0)
+            !(asked && *shown == Shown::No)
         });
+        let open = &self.open;
+        self.deleted.retain(|id| open.contains_key(id));
     }
 
     /// Notes what has ended; asks for what the queue shows no more.
@@ -224,16 +242,12 @@ impl Pilot {
         for task in shown {
             states.insert(&task.id, task);
             if task.state.is_live() {
-                let open = self.open.entry(task.id.clone()).or_insert_with(|| Open {
-                    name: task.name.clone(),
-                    missing: 0,
-                });
-                open.missing = 0;
+                self.open.insert(task.id.clone(), Shown::Yes);
             }
         }
         let mut ended = Vec::new();
         let mut missing = BTreeSet::new();
-        for (id, open) in &mut self.open {
+        for (id, still) in &mut self.open {
             // An array that was deleted before any of it began is shown as one.
             let whole = TaskId::whole(&id.array);
             match states.get(id).or_else(|| states.get(&whole)) {
@@ -244,7 +258,7 @@ impl Pilot {
                     state: task.state.clone(),
                 }),
                 None => {
-                    open.missing += 1;
+                    *still = Shown::No;
                     missing.insert(whole);
                 }
             }
@@ -280,6 +294,7 @@ impl Pilot {
                     now,
                     format!("allocation {} ({}) failed: {how}", task.id, task.name),
                 );
+                self.failed = task.id.task.map(|number| (task.name.clone(), number));
             }
             End::Deleted => self.was_deleted(now, task),
         }

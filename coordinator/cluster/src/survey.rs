@@ -77,7 +77,8 @@ pub fn fitting(site: &Site, dials: Option<bool>) -> Mode {
     }
 }
 
-fn host(site: &Site, way: &Way, coordinator: Option<&str>) -> Result<Host, ClusterError> {
+/// Looks at the host where one logs in; `coordinator` is where its workers would dial.
+pub fn host(site: &Site, way: &Way, coordinator: Option<&str>) -> Result<Host, ClusterError> {
     let dial = coordinator.and_then(|address| address.rsplit_once(':')).map_or_else(
         || "echo dials=unknown".to_owned(),
         |(host, port)| {
@@ -145,7 +146,17 @@ fn milliseconds(time: SystemTime) -> i64 {
 pub fn program(site: &Site, way: &Way) -> Result<Program, ClusterError> {
     let attempt = format!("running {} there", site.program);
     let script = format!("{} version --output json", quote_path(&site.program));
-    let said = way.ask(&attempt, &site.program, &script)?;
+    let said = way
+        .ask(&attempt, &site.program, &script)
+        .map_err(|error| match error {
+            // Of what is missing in a queue it is said otherwise.
+            ClusterError::Missing { program, said } => ClusterError::Program {
+                path: program,
+                site: site.name.clone(),
+                what: said,
+            },
+            error => error,
+        })?;
     serde_json::from_str(&said).map_err(|error| ClusterError::Nonsense {
         attempt,
         what: error.to_string(),

@@ -18,6 +18,7 @@ use crate::config::Config;
 use crate::grpc::{self, Door};
 use crate::input::{Input, News};
 use crate::shell::{Kept, Shell};
+use crate::sites::Sites;
 use crate::state::{State, StateError};
 use crate::storage::Storage;
 
@@ -66,6 +67,9 @@ pub enum StartError {
         /// What the system said.
         source: io::Error,
     },
+    /// What this farm is called at its sites cannot be kept.
+    #[error(transparent)]
+    Sites(#[from] cluster::ClusterError),
     /// The system refused a thread.
     #[error("cannot start a thread")]
     Thread(#[source] io::Error),
@@ -114,10 +118,18 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     let storage =
         Storage::start(news.clone(), Box::new(store), open).map_err(StartError::Thread)?;
     let jobs = kept.len();
-    let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
+    let sites = Sites::start(&config, &state, address, &inputs)?;
+    let board = sites.board().clone();
+    let mut shell = Shell::new(
+        config.clone(),
+        state.clone(),
+        Clock::start(),
+        storage,
+        sites,
+    );
     shell.recall(kept);
     let shell = tokio::spawn(shell.run(heard, taken));
-    let door = Arc::new(Door::new(inputs.clone(), config, state.clone()));
+    let door = Arc::new(Door::new(inputs.clone(), config, state.clone(), board));
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();
     let server = tokio::spawn(grpc::serve(listener, token.clone(), door, async {

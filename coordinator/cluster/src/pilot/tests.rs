@@ -55,7 +55,7 @@ fn submit(number: u64, tasks: u32) -> Action {
 fn running() -> (Pilot, Vec<Task>) {
     let mut pilot = Pilot::new(settings());
     assert_eq!(pilot.observe(NOW, &[], PLENTY), [submit(1, 3)]);
-    pilot.submitted("flyby-x-a.1-1", &TaskId::whole("7"), 3);
+    pilot.submitted(&TaskId::whole("7"), 3);
     let shown: Vec<Task> = (1..=3).map(|number| task(number, runs())).collect();
     assert_eq!(pilot.observe(NOW, &shown, PLENTY), []);
     (pilot, shown)
@@ -148,7 +148,7 @@ fn one_that_the_queue_shows_no_more_is_asked_for_and_replaced() {
     let actions = pilot.observe(NOW, &shown, PLENTY);
     assert_eq!(actions, [Action::LookUp(asked.to_vec()), submit(2, 1)]);
     pilot.have_ended(NOW, &asked, &[]);
-    pilot.submitted("flyby-x-a.1-2", &TaskId::whole("8"), 1);
+    pilot.submitted(&TaskId::whole("8"), 1);
     shown.push(Task {
         id: TaskId::task("8", 1),
         name: "flyby-x-a.1-2".into(),
@@ -188,7 +188,7 @@ fn failures_are_said_and_tried_again_ever_later() {
     assert_eq!(pilot.standing().trouble.as_deref(), Some("no"));
     let now = now + PAUSE_FIRST.times(2);
     assert_eq!(pilot.observe(now, &[], PLENTY), [submit(3, 1)]);
-    pilot.submitted("flyby-x-a.1-3", &TaskId::whole("9"), 1);
+    pilot.submitted(&TaskId::whole("9"), 1);
     let well = |state| Task {
         id: TaskId::task("9", 1),
         name: "flyby-x-a.1-3".into(),

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::Read as _;
+use std::net::SocketAddr;
 use std::ops::{Range, RangeInclusive};
 use std::path::{Path, PathBuf};
 
@@ -331,18 +332,12 @@ impl Check<'_> {
         Some(text.clone())
     }
 
-    /// Where workers dial: a host and a port.
+    /// Where workers dial: an address and a port.
     fn dial(&mut self, value: Option<&Spanned<String>>) -> Option<String> {
         let value = value?;
         let text = value.get_ref();
-        let port = text.rsplit_once(':').and_then(|(host, port)| {
-            let is_host = !host.is_empty()
-                && host
-                    .chars()
-                    .all(|letter| letter.is_ascii_alphanumeric() || "-.:[]".contains(letter));
-            port.parse::<u16>().ok().filter(|_| is_host)
-        });
-        if port.is_none_or(|port| port == 0) {
+        let address: Option<SocketAddr> = text.parse().ok();
+        if address.is_none_or(|address| address.port() == 0) {
             let message = format!("`{text}` is no address of a coordinator");
             self.add(value.span(), message, "write it as 192.0.2.7:7359");
         }

@@ -33,6 +33,7 @@ use wire::{BadMessage, Failure, convert};
 use crate::config::Config;
 use crate::inbox::Inbox;
 use crate::input::{Input, Reply};
+use crate::sites::Board;
 use crate::space::Space;
 use crate::state::State;
 
@@ -55,11 +56,17 @@ pub(crate) struct Door {
     submissions: Arc<Semaphore>,
     blocks: Arc<Semaphore>,
     watchers: Arc<Semaphore>,
+    sites: Board,
     next_link: AtomicU64,
 }
 
 impl Door {
-    pub(crate) fn new(inputs: mpsc::Sender<Input>, config: Arc<Config>, state: Arc<State>) -> Self {
+    pub(crate) fn new(
+        inputs: mpsc::Sender<Input>,
+        config: Arc<Config>,
+        state: Arc<State>,
+        sites: Board,
+    ) -> Self {
         let limits = &config.limits;
         Self {
             inputs,
@@ -68,6 +75,7 @@ impl Door {
             blocks: Arc::new(Semaphore::new(limits.blocks_in_flight_max)),
             watchers: Arc::new(Semaphore::new(limits.watchers_max)),
             next_link: AtomicU64::new(1),
+            sites,
             config,
             state,
         }
