@@ -17,3 +17,4 @@ mod harness;
 mod backends;
 mod commands;
 mod engine;
+mod pilot;
