@@ -27,7 +27,8 @@ pub(crate) enum SiteCommand {
     Check(CheckOptions),
     /// Copies a program to a site, without root, and runs it there before it takes the place of the one before.
     Install(Install),
-    /// Ends and removes everything that this farm has at a site, the program aside.
+    /// Ends and removes everything that this farm has at a site, the program aside. A coordinator that runs submits again
+    /// what its jobs need: stop it first, or cancel them.
     Clean(Clean),
 }
 

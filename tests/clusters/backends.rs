@@ -116,7 +116,7 @@ impl Suite {
                 assert_eq!(limits.array_tasks, Some(1_000), "{limits:?}");
                 assert_eq!(limits.queues, ["all.q"]);
             }
-            Kind::Ssh | Kind::Local => assert!(limits.running.unwrap() > 0, "{limits:?}"),
+            Kind::Ssh | Kind::Local => assert_eq!(limits.running, None, "{limits:?}"),
         }
         assert!(limits.slots.unwrap().1 > 0, "{limits:?}");
     }

@@ -83,7 +83,10 @@ impl Flight {
 /// Whatever becomes of a test, no process of a host without a queue stays behind.
 impl Drop for Flight {
     fn drop(&mut self) {
-        self.farm.coordinator.end_now();
+        // It would submit again.
+        if self.farm.coordinator.ended().is_none() {
+            self.farm.coordinator.kill();
+        }
         let _ = self
             .farm
             .place
@@ -127,6 +130,29 @@ fn slurm_gives_the_frames_of_one_process() {
     assert!(queue(&engine, &[]).is_empty());
     // Who had nothing to do had left by itself, and nobody wants another.
     assert_eq!(flight.count("wanted"), 0);
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn grid_engine_gives_the_frames_of_one_process() {
+    let Some(mut engine) = Engine::gridengine(2, &[]) else {
+        return;
+    };
+    if !engine.add_ssh() {
+        return;
+    }
+    // Its hosts have networks of their own: a tunnel to each brings its workers to the coordinator's loopback.
+    let more = "coordinator = '127.0.0.1:9000'\nmode = 'pilot'\nidle = '3 s'";
+    let flight = Flight::new(&engine, Kind::GridEngine, more);
+    let config = engine.folder.join("ssh/config").display().to_string();
+    let there = format!("127.0.0.1:9000:{}", flight.farm.address);
+    let _tunnels = ["ge1", "ge2"].map(|host| {
+        let mut tunnel = std::process::Command::new("ssh");
+        tunnel.args(["-F", &config, "-N", "-R", &there, host]);
+        flight.farm.place.start_command("tunnel", tunnel)
+    });
+    renders_the_same(&flight);
+    assert!(!engine.tool("qstat", &["-u", "*"]).contains("flyby-"));
 }
 
 #[test]

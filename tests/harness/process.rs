@@ -133,13 +133,6 @@ impl Process {
         wait::until_within(limit, &what, || self.ended())
     }
 
-    /// Sees that it has ended, whether it had already or is killed.
-    pub(crate) fn end_now(&mut self) {
-        if self.ended().is_none() {
-            self.kill();
-        }
-    }
-
     /// `kill -9`, and waits until it is gone.
     pub(crate) fn kill(&mut self) {
         self.signal(Signal::Kill);

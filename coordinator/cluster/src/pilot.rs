@@ -13,13 +13,16 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use model::{Span, Timestamp};
 
-use crate::queue::{Task, TaskId, TaskState};
-use crate::sites::Cancelled;
+use crate::queue::{Limits, Task, TaskId, TaskState};
+use crate::sites::{Cancelled, Kind, Site};
 
 pub use script::{script, token_file};
 
 /// Most allocations of a site that sets no limit.
 const ALLOCATIONS_MAX: u32 = 1_000;
+
+/// Tasks of an array where neither the site nor its queue says how many there may be.
+const ARRAY_TASKS: u32 = 1_000;
 
 /// Allocations while nobody knows how much there is to do.
 const UNMEASURED_MAX: u32 = 4;
@@ -53,6 +56,30 @@ pub struct Settings {
     pub array_max: u32,
     /// What becomes of an allocation that somebody deleted.
     pub cancelled: Cancelled,
+}
+
+impl Settings {
+    /// Those of a site, by what it and its queue say.
+    pub fn of(site: &Site, limits: &Limits, names: String) -> Self {
+        let array_max = [site.max_array_size, limits.array_tasks];
+        // Where nothing holds back what is too much, there are no more than have processors.
+        let processors = limits
+            .slots
+            .map(|(_, all)| (all / site.threads.max(1)).max(1));
+        let running_max = match site.kind {
+            Kind::Slurm | Kind::GridEngine => site.max_running,
+            Kind::Ssh | Kind::Local => site.max_running.or(processors),
+        };
+        Self {
+            names,
+            threads: site.threads,
+            running_max,
+            queue_running_max: limits.running,
+            ahead: site.ahead,
+            array_max: array_max.into_iter().flatten().min().unwrap_or(ARRAY_TASKS),
+            cancelled: site.cancelled,
+        }
+    }
 }
 
 /// What the farm wants.

@@ -41,6 +41,9 @@ runs() { # whether anybody takes tasks in this folder
 
 const TEMPLATE: &str = include_str!("../../../deploy/ssh/array.sh");
 
+/// Arrays of which is kept what became of them.
+const KEPT_MAX: u32 = 50;
+
 pub(crate) struct Processes {
     template: Option<PathBuf>,
     way: Way,
@@ -83,7 +86,6 @@ impl Queue for Processes {
             .next()
             .and_then(|line| line.split('.').next()?.parse::<u32>().ok());
         Ok(Limits {
-            running: processors,
             slots: processors.map(|count| (count.saturating_sub(load.unwrap_or(0)), count)),
             ..Limits::default()
         })
@@ -141,6 +143,12 @@ fn start(folder: &str, array: &Array, script: &str) -> String {
     let _ = write!(
         text,
         "cat >\"$t/script\" <<'{end}'\n{script}{end}\ncat >\"$t/runner\" <<'{end}'\n{RUNNER}{end}\n"
+    );
+    // Of arrays that have ended only the latest are kept.
+    let _ = writeln!(
+        text,
+        "(cd {folder} && ls -td -- */ 2>/dev/null | tail -n +{KEPT_MAX} | while read -r old; do\n\
+         ls \"$old\"/*.runner >/dev/null 2>&1 || rm -rf \"./$old\"; done)"
     );
     // In place before anybody runs in it.
     let _ = write!(

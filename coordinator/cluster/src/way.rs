@@ -351,8 +351,7 @@ impl Gathered {
 
     fn is_full(&self) -> bool {
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-        // Whoever complains at length is not wrong for that.
-        bytes.len() >= self.most && self.most == STDOUT_MAX
+        bytes.len() >= self.most
     }
 
     fn text(&self) -> String {

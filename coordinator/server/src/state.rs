@@ -5,6 +5,8 @@
 //! token              64 hexadecimal digits, mode 0600
 //! epoch              how often a coordinator was started here
 //! coordinator.json   where the running one listens
+//! farm               what this farm is called at its sites; there once it has some
+//! ssh/               connections to them that are open
 //! farm.sqlite        jobs, finished images, blocks of the others: what the `store` keeps
 //! jobs/arriving/     submissions, on the disk that they are to stay on; of this start only
 //! jobs/<job>/scene/    the scene and its assets

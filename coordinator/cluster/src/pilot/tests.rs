@@ -301,3 +301,24 @@ fn what_waits_for_help_is_said() {
     pilot.observe(NOW, &shown, PLENTY);
     assert_eq!(pilot.standing().trouble, None);
 }
+
+#[test]
+fn settings_follow_the_site_and_its_queue() {
+    let site = |text: &str| {
+        let text = format!("[site.a]\n{text}");
+        crate::sites::parse("s", &text, None).unwrap().0.remove(0)
+    };
+    let limits = Limits {
+        array_tasks: Some(1_000),
+        slots: Some((3, 8)),
+        ..Limits::default()
+    };
+    let of = |text: &str| Settings::of(&site(text), &limits, String::new());
+    assert_eq!(of("kind = 'slurm'").array_max, 1_000);
+    assert_eq!(of("kind = 'slurm'\nmax_array_size = 10").array_max, 10);
+    assert_eq!(of("kind = 'slurm'").running_max, None);
+    // A host holds nothing back by itself.
+    assert_eq!(of("kind = 'local'\nthreads = 3").running_max, Some(2));
+    assert_eq!(of("kind = 'local'\nthreads = 30").running_max, Some(1));
+    assert_eq!(of("kind = 'local'\nmax_running = 5").running_max, Some(5));
+}

@@ -1,6 +1,6 @@
 //! The thread of one site: asks the loop what is wanted and the queue what is there, and does what the pilot says.
 
-use std::fs::{self, File};
+use std::fs;
 use std::path::PathBuf;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
@@ -25,9 +25,6 @@ const PAUSE_LONGEST: Duration = Duration::from_secs(300);
 /// How long the token may take to arrive.
 const TOKEN_LIMIT: Span = Span::from_secs(60);
 
-/// Tasks of an array where neither the site nor its queue says how many there may be.
-const ARRAY_TASKS: u32 = 1_000;
-
 /// What the thread of a site works with.
 pub(crate) struct Errand {
     pub(crate) camp: Camp,
@@ -48,7 +45,7 @@ struct Known {
     limits: Limits,
     /// Whether the queue was seen to hold nothing of ours.
     is_empty: bool,
-    /// Whether token and program are in their place.
+    /// Whether the program was seen to be the right one.
     is_ready: bool,
 }
 
@@ -151,17 +148,8 @@ impl Errand {
             return Ok(None);
         }
         let limits = self.camp.queue.limits()?;
-        let array_max = [site.max_array_size, limits.array_tasks];
-        let array_max = array_max.into_iter().flatten().min();
-        let settings = Settings {
-            names: format!("{}{}-", self.camp.prefix(), self.epoch.0),
-            threads: site.threads,
-            running_max: site.max_running,
-            queue_running_max: limits.running,
-            ahead: site.ahead,
-            array_max: array_max.unwrap_or(ARRAY_TASKS),
-            cancelled: site.cancelled,
-        };
+        let names = format!("{}{}-", self.camp.prefix(), self.epoch.0);
+        let settings = Settings::of(site, &limits, names);
         Ok(Some(Known {
             pilot: Pilot::new(settings),
             limits,
@@ -241,40 +229,33 @@ impl Errand {
         }
     }
 
-    /// Sees that the program is there and makes the same pixels, and brings the token.
+    /// Sees once that the program there makes the same pixels, and brings the token: each time, since it may be another.
     fn make_ready(&self, known: &mut Known) -> Result<(), ClusterError> {
-        if known.is_ready {
-            return Ok(());
-        }
         let (site, way) = (&self.camp.site, &self.camp.way);
-        let program = survey::program(site, way)?;
-        if program.revision != self.revision.0 {
-            return Err(ClusterError::Program {
-                path: site.program.clone(),
-                site: site.name.clone(),
-                what: format!(
-                    "it makes pixels of renderer revision {}, and this farm those of {}",
-                    program.revision, self.revision.0
-                ),
-            });
+        if !known.is_ready {
+            let program = survey::program(site, way)?;
+            if program.revision != self.revision.0 {
+                return Err(ClusterError::Program {
+                    path: site.program.clone(),
+                    site: site.name.clone(),
+                    what: format!(
+                        "it makes pixels of renderer revision {}, and this farm those of {}",
+                        program.revision, self.revision.0
+                    ),
+                });
+            }
+            known.is_ready = true;
         }
         let failed = |source| ClusterError::File {
             attempted: "read the token",
             path: self.token.display().to_string(),
             source,
         };
-        let bytes = fs::metadata(&self.token).map_err(failed)?.len();
-        let token = File::open(&self.token).map_err(failed)?;
-        way.put(
-            token,
-            bytes,
-            &pilot::token_file(&self.camp),
-            0o600,
-            TOKEN_LIMIT,
-        )?;
-        self.camp.trim_logs()?;
-        known.is_ready = true;
-        Ok(())
+        let token = fs::read(&self.token).map_err(failed)?;
+        let bytes = token.len() as u64;
+        let path = pilot::token_file(&self.camp);
+        way.put(token.as_slice(), bytes, &path, 0o600, TOKEN_LIMIT)?;
+        self.camp.trim_logs()
     }
 
     fn show(&self, standing: &Standing) {
