@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use cluster::camp::{Camp, farm_of};
+use cluster::survey::Nodes;
 use cluster::{ClusterError, Site, Sites, SitesError, install, survey};
 use miette::Severity;
 use wire::proto::{ListSitesRequest, SiteStatus};
@@ -58,6 +59,11 @@ pub(crate) struct CheckOptions {
     /// state folder].
     #[arg(long, value_name = "ADDR", help_heading = "Farm")]
     coordinator: Option<String>,
+
+    /// Also submits one task, which says whether a host of the queue reaches the coordinator: takes as long as the queue
+    /// does, five minutes at most.
+    #[arg(long)]
+    node: bool,
 
     #[command(flatten)]
     file: SitesOptions,
@@ -201,6 +207,10 @@ fn check(context: &Context, options: &CheckOptions) -> Result<Ending, Error> {
         .ok()
         .and_then(|state| wire::place::coordinator(&state).ok())
         .map(|coordinator| coordinator.address.to_string());
+    let nodes = match options.node {
+        true => Nodes::One,
+        false => Nodes::No,
+    };
     let mut checks = Vec::new();
     for site in sites {
         let camp = camp(context, site)?;
@@ -209,17 +219,9 @@ fn check(context: &Context, options: &CheckOptions) -> Result<Ending, Error> {
             .as_ref()
             .or(camp.site.coordinator.as_ref());
         let coordinator = asked.or(running.as_ref());
-        let seen = survey::look(
-            &camp.site,
-            &camp.way,
-            camp.queue.as_ref(),
-            coordinator.map(String::as_str),
-        );
-        checks.push(Check::new(
-            &camp.site,
-            seen,
-            coordinator.map(String::as_str),
-        ));
+        let coordinator = coordinator.map(String::as_str);
+        let seen = survey::look(&camp, coordinator, nodes);
+        checks.push(Check::new(&camp.site, seen, coordinator));
     }
     let checks = Checks::new(checks);
     output::print(context.output, &checks)?;

@@ -50,7 +50,7 @@ pub(crate) struct Check {
     clock_ahead_ms: Option<i64>,
     /// Whether the coordinator's address answers from there.
     dials: Option<bool>,
-    /// What was looked at, in order: `login`, `clock`, `disk`, `queue`, `limits`, `program`, `address`, `mode`.
+    /// What was looked at, in order: `login`, `clock`, `disk`, `queue`, `limits`, `program`, `node`, `address`, `mode`.
     findings: Vec<Finding>,
 }
 
@@ -122,7 +122,16 @@ impl Check {
             Some(Err(error)) => findings.push(no_program(site, &error)),
             None => {}
         }
-        let dials = host.as_ref().and_then(|host| host.dials);
+        let mut dials = host.as_ref().and_then(|host| host.dials);
+        match seen.node {
+            Some(Ok(node)) => {
+                // It is there that workers run.
+                dials = node.dials.or(dials);
+                findings.push(of_node(&node));
+            }
+            Some(Err(error)) => findings.push(trouble("node", &error)),
+            None => {}
+        }
         let mode = host.as_ref().map(|_| survey::fitting(site, dials));
         if let Some(mode) = mode {
             findings.extend(of_mode(mode, dials, coordinator));
@@ -260,6 +269,26 @@ fn of_program(site: &Site, program: &Program) -> Finding {
                 render::REVISION
             ),
             format!("`flyby site install {}`", site.name),
+        ),
+    }
+}
+
+fn of_node(node: &survey::Node) -> Finding {
+    let name = &node.name;
+    match node.dials {
+        Some(true) => Finding::fine(
+            "node",
+            format!("{name} ran a task and reaches the coordinator"),
+        ),
+        Some(false) => Finding::doubtful(
+            "node",
+            format!("{name} ran a task and does not reach the coordinator"),
+            "open the coordinator's port to the hosts of the queue, or write mode = \"poll\"",
+        ),
+        None => Finding::doubtful(
+            "node",
+            format!("{name} ran a task, and has no bash or timeout to dial by"),
+            "submit a job: `flyby site list` says whether its workers come",
         ),
     }
 }

@@ -66,6 +66,19 @@ fn a_host_is_checked_and_gets_the_program() {
     assert_eq!(deaf[0]["dials"], false);
     assert_eq!(deaf[0]["mode"], "poll");
 
+    // A task on the host itself says the same.
+    let (_, node) = check(&place, &["--node", "--coordinator", "127.0.0.1:9"]);
+    assert_eq!(finding(&node[0], "node")["verdict"], "doubtful", "{node:?}");
+    let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap().to_string();
+    let (_, node) = check(&place, &["--node", "--coordinator", &address]);
+    assert_eq!(finding(&node[0], "node")["verdict"], "fine", "{node:?}");
+    assert_eq!(node[0]["mode"], "pilot");
+    place
+        .flyby(["site", "clean", "host", "--sites", "sites.toml"])
+        .ok();
+    assert_eq!(place.files("there"), ["bin/flyby"]);
+
     // A host key that is not the one that is known.
     let known = engine.folder.join("ssh/known_hosts");
     let keys = std::fs::read_to_string(&known).unwrap();

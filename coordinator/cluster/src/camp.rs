@@ -119,13 +119,14 @@ impl Camp {
 
     /// The end of what a task wrote, for people.
     pub fn said(&self, array: &str, task: u32) -> Result<String, ClusterError> {
+        Ok(crate::way::brief(&self.log_of(array, task)?))
+    }
+
+    /// The end of what a task wrote, as it is.
+    pub(crate) fn log_of(&self, array: &str, task: u32) -> Result<String, ClusterError> {
         let log = quote_path(&self.log(array).replace('%', &task.to_string()));
-        let said = self.way.ask(
-            "reading a log",
-            "tail",
-            &format!("tail -c 1000 {log} 2>/dev/null || :"),
-        )?;
-        Ok(crate::way::brief(&said))
+        let script = format!("tail -c 1000 {log} 2>/dev/null || :");
+        self.way.ask("reading a log", "tail", &script)
     }
 
     /// Removes all but the latest logs.

@@ -1,14 +1,23 @@
 //! What a site is like, for `flyby site check`: the host where one logs in, its queue, the program there.
 
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use model::Span;
 use serde::Deserialize;
 
+use crate::camp::Camp;
 use crate::error::ClusterError;
-use crate::queue::{About, Limits, Queue};
+use crate::queue::{About, Array, Limits};
 use crate::sites::{Mode, Site};
 use crate::way::{LIMIT, Way};
 use crate::words::{quote, quote_path};
+
+/// How long a host of the queue may take to dial.
+const NODE_TIME: Span = Span::from_secs(60);
+
+/// How long the queue may take to give one.
+const NODE_LIMIT: Span = Span::from_secs(300);
 
 /// The host where one logs in.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -55,15 +64,29 @@ pub struct Survey {
     pub queue: Option<Result<(About, Limits), ClusterError>>,
     /// The program; `None` where the host cannot be reached.
     pub program: Option<Result<Program, ClusterError>>,
+    /// A host of the queue, where one was asked for.
+    pub node: Option<Result<Node, ClusterError>>,
+}
+
+/// Whether a host of the queue is asked for, too.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Nodes {
+    /// Only the host where one logs in is looked at.
+    No,
+    /// One task is submitted.
+    One,
 }
 
 /// Looks at a site. `coordinator` is where its workers would dial.
-pub fn look(site: &Site, way: &Way, queue: &dyn Queue, coordinator: Option<&str>) -> Survey {
+pub fn look(camp: &Camp, coordinator: Option<&str>, nodes: Nodes) -> Survey {
+    let (site, way, queue) = (&camp.site, &camp.way, &camp.queue);
     let host = host(site, way, coordinator);
     let can = host.is_ok();
+    let asked = coordinator.filter(|_| can && nodes == Nodes::One);
     Survey {
         queue: can.then(|| queue.about().and_then(|about| Ok((about, queue.limits()?)))),
         program: can.then(|| program(site, way)),
+        node: asked.map(|coordinator| node(camp, coordinator)),
         host,
     }
 }
@@ -79,18 +102,7 @@ pub fn fitting(site: &Site, dials: Option<bool>) -> Mode {
 
 /// Looks at the host where one logs in; `coordinator` is where its workers would dial.
 pub fn host(site: &Site, way: &Way, coordinator: Option<&str>) -> Result<Host, ClusterError> {
-    let dial = coordinator.and_then(|address| address.rsplit_once(':')).map_or_else(
-        || "echo dials=unknown".to_owned(),
-        |(host, port)| {
-            // Of the shells bash alone can dial.
-            let target = format!("/dev/tcp/{}/{port}", host.trim_matches(['[', ']']));
-            format!(
-                "if ! command -v bash >/dev/null || ! command -v timeout >/dev/null; then echo dials=unknown; \
-                 elif timeout 5 bash -c {} 2>/dev/null; then echo dials=yes; else echo dials=no; fi",
-                quote(&format!(": <{target}"))
-            )
-        },
-    );
+    let dial = coordinator.map_or_else(|| "echo dials=unknown".to_owned(), dial);
     let script = format!(
         "echo now=$(date +%s%3N)\n\
          echo name=$(uname -n)\n\
@@ -108,11 +120,7 @@ pub fn host(site: &Site, way: &Way, coordinator: Option<&str>) -> Result<Host, C
     let before = SystemTime::now();
     let said = way.run("looking at the host", &script, LIMIT)?;
     let took = before.elapsed().unwrap_or_default();
-    let value = |name: &str| {
-        let lines = said.stdout.lines();
-        let found = lines.filter_map(|line| line.strip_prefix(name)?.strip_prefix('='));
-        found.map(str::trim).next().unwrap_or_default()
-    };
+    let value = |name: &str| value(&said.stdout, name);
     let here = milliseconds(before);
     Ok(Host {
         name: value("name").to_owned(),
@@ -129,11 +137,82 @@ pub fn host(site: &Site, way: &Way, coordinator: Option<&str>) -> Result<Host, C
             .parse::<u64>()
             .ok()
             .and_then(|kibibytes| kibibytes.checked_mul(1_024)),
-        dials: match value("dials") {
-            "yes" => Some(true),
-            "no" => Some(false),
-            _ => None,
-        },
+        dials: answers(&said.stdout),
+    })
+}
+
+/// The script that says whether an address answers.
+fn dial(address: &str) -> String {
+    let (host, port) = address.rsplit_once(':').unwrap_or((address, "0"));
+    // Of the shells bash alone can dial.
+    let target = format!("/dev/tcp/{}/{port}", host.trim_matches(['[', ']']));
+    format!(
+        "if ! command -v bash >/dev/null || ! command -v timeout >/dev/null; then echo dials=unknown; \
+         elif timeout 5 bash -c {} 2>/dev/null; then echo dials=yes; else echo dials=no; fi",
+        quote(&format!(": <{target}"))
+    )
+}
+
+/// What a script printed under a name.
+fn value<'a>(said: &'a str, name: &str) -> &'a str {
+    let lines = said.lines();
+    let mut found = lines.filter_map(|line| line.strip_prefix(name)?.strip_prefix('='));
+    found.next().map_or("", str::trim)
+}
+
+fn answers(said: &str) -> Option<bool> {
+    match value(said, "dials") {
+        "yes" => Some(true),
+        "no" => Some(false),
+        _ => None,
+    }
+}
+
+/// A host that the queue gave.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Node {
+    /// Its name.
+    pub name: String,
+    /// Whether the coordinator's address answers from there; `None` where nobody could try.
+    pub dials: Option<bool>,
+}
+
+/// Has a host that the queue gives try to dial; takes as long as the queue does, and no longer than five minutes.
+pub fn node(camp: &Camp, coordinator: &str) -> Result<Node, ClusterError> {
+    let name = format!("{}check-{}", camp.prefix(), milliseconds(SystemTime::now()));
+    let array = Array {
+        script: format!(
+            "echo name=$(uname -n)\n{}\necho end=here",
+            dial(coordinator)
+        ),
+        log: camp.log(&name),
+        name: name.clone(),
+        tasks: 1,
+        running_max: None,
+        time_limit: Some(NODE_TIME),
+    };
+    let id = camp.queue.submit(&array)?;
+    let found = await_node(camp, &name);
+    // Whatever came of it, nothing of it stays in the queue.
+    camp.queue.delete(&[id])?;
+    found
+}
+
+fn await_node(camp: &Camp, array: &str) -> Result<Node, ClusterError> {
+    let deadline = Instant::now() + Duration::from_micros(NODE_LIMIT.0);
+    while Instant::now() < deadline {
+        let said = camp.log_of(array, 1)?;
+        if value(&said, "end") == "here" {
+            return Ok(Node {
+                name: value(&said, "name").to_owned(),
+                dials: answers(&said),
+            });
+        }
+        thread::sleep(Duration::from_secs(1));
+    }
+    Err(ClusterError::TimedOut {
+        attempt: "waiting for a host of the queue".to_owned(),
+        limit: NODE_LIMIT,
     })
 }
 
