@@ -87,8 +87,10 @@ impl Settings {
 pub struct Wanted {
     /// Threads that could be of use, at most.
     pub squares: u64,
-    /// How long all of it takes one thread; `None` while that is not known.
-    pub time: Option<Span>,
+    /// Of those, the ones of which nobody knows how long they take.
+    pub unmeasured: u64,
+    /// How long one thread takes over the others.
+    pub time: Span,
     /// Threads of workers that are no allocations of this site.
     pub others: u64,
 }
@@ -385,10 +387,9 @@ impl Pilot {
     /// How many allocations there should be, those that run among them.
     fn target(&self, wanted: Wanted) -> u32 {
         let threads = u64::from(self.settings.threads.max(1));
-        let useful = match wanted.time {
-            Some(time) => time.0.div_ceil(USEFUL.0),
-            None => u64::from(UNMEASURED_MAX).saturating_mul(threads),
-        };
+        let measured = wanted.time.0.div_ceil(USEFUL.0);
+        let few = u64::from(UNMEASURED_MAX).saturating_mul(threads);
+        let useful = measured.saturating_add(wanted.unmeasured.min(few));
         let useful = useful.min(wanted.squares).saturating_sub(wanted.others);
         let allocations = u32::try_from(useful.div_ceil(threads)).unwrap_or(u32::MAX);
         allocations.min(self.most())

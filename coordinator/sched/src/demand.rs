@@ -9,8 +9,10 @@ use crate::{Needs, Offer, Sched};
 pub struct Demand {
     /// Grid squares that are not durable, of 1,024 pixels each: no more threads than these can be of use.
     pub squares: u64,
-    /// How long one thread of the usual speed would take; `None` while some job of it has not been measured.
-    pub time: Option<Span>,
+    /// Of those, the squares of jobs of which nothing has been measured yet.
+    pub unmeasured: u64,
+    /// How long one thread of the usual speed would take over the others.
+    pub time: Span,
 }
 
 /// Pixels of a grid square.
@@ -23,10 +25,7 @@ impl Sched {
         let jobs = self.jobs.values().filter(|job| job.goes_on());
         let served =
             jobs.filter(|job| job.spec.revision == offer.revision && meets(&job.spec.needs));
-        let mut demand = Demand {
-            squares: 0,
-            time: Some(Span(0)),
-        };
+        let mut demand = Demand::default();
         for job in served {
             let view = job.view();
             let left = view.pixels.saturating_sub(view.pixels_done);
@@ -35,9 +34,12 @@ impl Sched {
             if open == 0 || left == 0 {
                 continue;
             }
-            demand.squares = demand.squares.saturating_add(left.div_ceil(SQUARE_PIXELS));
-            let cost = self.cost_left(job).map(Span);
-            demand.time = demand.time.zip(cost).map(|(time, cost)| time + cost);
+            let squares = left.div_ceil(SQUARE_PIXELS);
+            demand.squares = demand.squares.saturating_add(squares);
+            match self.cost_left(job) {
+                Some(cost) => demand.time = demand.time + Span(cost),
+                None => demand.unmeasured = demand.unmeasured.saturating_add(squares),
+            }
         }
         demand
     }

@@ -13,11 +13,7 @@ fn left(farm: &Farm) -> Demand {
 #[test]
 fn nothing_is_wanted_of_an_idle_farm() {
     let farm = Farm::new(Config::new(EPOCH));
-    let none = Demand {
-        squares: 0,
-        time: Some(model::Span(0)),
-    };
-    assert_eq!(left(&farm), none);
+    assert_eq!(left(&farm), Demand::default());
 }
 
 #[test]
@@ -26,13 +22,16 @@ fn what_is_left_shrinks_as_it_is_done_and_not_as_it_is_leased() {
     farm.job(2);
     let before = left(&farm);
     assert!(before.squares > 0);
-    assert_eq!(before.time, None, "nothing was measured");
+    assert_eq!(before.unmeasured, before.squares, "nothing was measured");
     farm.worker(1, 1);
     assert_eq!(left(&farm).squares, before.squares);
+    farm.stores(1, 1, 0, block(0));
+    let after = left(&farm);
+    assert!(after.squares < before.squares, "{after:?}");
     farm.command(Command::Pause);
     assert_eq!(left(&farm).squares, 0);
     farm.command(Command::Resume);
-    assert_eq!(left(&farm).squares, before.squares);
+    assert_eq!(left(&farm).squares, after.squares);
     farm.command(Command::Cancel);
     assert_eq!(left(&farm).squares, 0);
 }

@@ -18,13 +18,15 @@ fn settings() -> Settings {
 /// So much work that there can never be enough allocations.
 const PLENTY: Wanted = Wanted {
     squares: 1_000_000,
-    time: Some(Span(HOUR.0 * 1_000)),
+    unmeasured: 0,
+    time: Span(HOUR.0 * 1_000),
     others: 0,
 };
 
 const NOTHING: Wanted = Wanted {
     squares: 0,
-    time: Some(Span(0)),
+    unmeasured: 0,
+    time: Span(0),
     others: 0,
 };
 
@@ -88,21 +90,24 @@ fn few_are_submitted_for_little_work() {
         [Action::Submit { tasks, .. }] => tasks,
         ref other => panic!("{other:?}"),
     };
-    let minutes = |minutes: u64| Some(Span::from_secs(60 * minutes));
-    let wanted = |squares, time, others| Wanted {
+    let wanted = |squares, minutes: u64, others| Wanted {
         squares,
-        time,
+        unmeasured: 0,
+        time: Span::from_secs(60 * minutes),
         others,
     };
-    assert_eq!(tasks(&mut pilot, wanted(1_000, minutes(5), 0)), 10);
-    assert_eq!(tasks(&mut pilot, wanted(1_000, minutes(5), 4)), 6);
-    assert_eq!(tasks(&mut pilot, wanted(2, minutes(5), 0)), 2);
-    assert_eq!(tasks(&mut pilot, wanted(1_000, None, 0)), UNMEASURED_MAX);
-    assert_eq!(
-        tasks(&mut pilot, wanted(1_000_000, minutes(60_000), 0)),
-        100
-    );
-    assert_eq!(pilot.observe(NOW, &[], wanted(1_000, minutes(5), 10)), []);
+    assert_eq!(tasks(&mut pilot, wanted(1_000, 5, 0)), 10);
+    assert_eq!(tasks(&mut pilot, wanted(1_000, 5, 4)), 6);
+    assert_eq!(tasks(&mut pilot, wanted(2, 5, 0)), 2);
+    assert_eq!(tasks(&mut pilot, wanted(1_000_000, 60_000, 0)), 100);
+    assert_eq!(pilot.observe(NOW, &[], wanted(1_000, 5, 10)), []);
+    // Of what nobody has measured a few find out how long it takes; what else there is counts as before.
+    let unmeasured = |minutes| Wanted {
+        unmeasured: 500,
+        ..wanted(1_000, minutes, 0)
+    };
+    assert_eq!(tasks(&mut pilot, unmeasured(0)), UNMEASURED_MAX);
+    assert_eq!(tasks(&mut pilot, unmeasured(5)), 10 + UNMEASURED_MAX);
 }
 
 #[test]

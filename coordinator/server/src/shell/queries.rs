@@ -124,6 +124,7 @@ impl Shell {
         });
         cluster::pilot::Wanted {
             squares: demand.squares,
+            unmeasured: demand.unmeasured,
             time: demand.time,
             others: others.map(|view| u64::from(view.threads)).sum(),
         }
