@@ -1,24 +1,18 @@
 //! A scene file, read with what the user changes in it; its mistakes shown where they are.
 
-use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{self, IsTerminal as _, Read as _};
+use std::io::{self, Read as _};
 use std::path::Path;
 
-use miette::{
-    GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report,
-    Severity,
-};
+use miette::Severity;
 use model::{Digest, FrameRange, ImageNumber};
 use render::Assets;
 use scene::{Description, Loaded, Mistake, Overrides, SceneError, Source};
 
+use crate::caret::Caret;
 use crate::error::Error;
 use crate::options::SceneOptions;
 use crate::output;
-
-/// Columns of a report of mistakes.
-const REPORT_WIDTH: usize = 100;
 
 /// A scene, valid and named.
 pub(crate) struct Scene {
@@ -146,35 +140,18 @@ pub(crate) fn mistakes(error: &SceneError) -> Error {
     Error::usage(text.trim_end())
 }
 
-/// A mistake or a warning with its line, a caret, and what to do.
+/// A mistake or a warning of a scene.
 fn show(sources: &[Source], mistake: &Mistake, severity: Severity) -> String {
     let source = &sources[mistake.place.source];
-    let mut diagnostic = MietteDiagnostic::new(&mistake.message).with_severity(severity);
-    if let Some(help) = &mistake.help {
-        diagnostic = diagnostic.with_help(help);
-    }
-    if !source.text.is_empty() {
-        let span = mistake.place.span.clone();
-        diagnostic = diagnostic.with_label(LabeledSpan::at(span, &mistake.label));
-    }
-    let report = Report::new(diagnostic)
-        .with_source_code(NamedSource::new(&source.name, source.text.clone()));
-    let theme = if io::stderr().is_terminal() {
-        GraphicalTheme::unicode()
-    } else {
-        GraphicalTheme::unicode_nocolor()
+    let caret = Caret {
+        file: &source.name,
+        text: &source.text,
+        span: mistake.place.span.clone(),
+        message: &mistake.message,
+        label: &mistake.label,
+        help: mistake.help.as_deref(),
     };
-    let mut text = String::new();
-    let shown = GraphicalReportHandler::new_themed(theme)
-        .with_width(REPORT_WIDTH)
-        .render_report(&mut text, report.as_ref());
-    if shown.is_err() {
-        // A span that the handler cannot show is no reason to hide the mistake.
-        let (line, column) = source.line_and_column(mistake.place.span.start);
-        text.clear();
-        let _ = writeln!(text, "{}:{line}:{column}: {}", source.name, mistake.message);
-    }
-    text
+    caret.show(severity)
 }
 
 #[cfg(test)]

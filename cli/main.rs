@@ -5,6 +5,7 @@
 //! the environment. Each command stands in a file of its own under `commands/`.
 
 mod bench;
+mod caret;
 mod commands;
 mod daemon;
 mod error;
@@ -19,6 +20,7 @@ mod output;
 mod places;
 mod progress;
 mod render;
+mod site;
 mod stop;
 mod twins;
 mod values;

@@ -1,7 +1,8 @@
-//! Ctrl-C, SIGTERM and SIGHUP as something to look at and to wait for.
+//! Ctrl-C, SIGTERM, SIGHUP and a queue's warnings as something to look at and to wait for.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
 use std::thread;
 
 use tokio::signal::unix::{Signal, SignalKind, signal};
@@ -46,29 +47,29 @@ impl Stop {
                 SignalKind::interrupt(),
                 SignalKind::terminate(),
                 SignalKind::hangup(),
+                // Queues announce the end of an allocation by these.
+                SignalKind::user_defined1(),
+                SignalKind::user_defined2(),
             ]
             .into_iter()
             .map(signal)
             .collect::<Result<Vec<_>, _>>()
             .map_err(failed)?
         };
-        let [interrupt, terminate, hangup] =
-            <[Signal; 3]>::try_from(signals).expect("three were asked for");
         thread::Builder::new()
             .name("signals".into())
-            .spawn(move || runtime.block_on(listening.listen(interrupt, terminate, hangup)))
+            .spawn(move || runtime.block_on(listening.listen(signals)))
             .map_err(failed)?;
         Ok(stop)
     }
 
-    async fn listen(self, mut interrupt: Signal, mut terminate: Signal, mut hangup: Signal) {
+    async fn listen(self, mut signals: Vec<Signal>) {
         loop {
-            let came = tokio::select! {
-                came = interrupt.recv() => came,
-                came = terminate.recv() => came,
-                came = hangup.recv() => came,
-            };
-            if came.is_none() {
+            let came = std::future::poll_fn(|context| {
+                let mut polled = signals.iter_mut().map(|signal| signal.poll_recv(context));
+                polled.find(Poll::is_ready).unwrap_or(Poll::Pending)
+            });
+            if came.await.is_none() {
                 return;
             }
             if self.is_set() {

@@ -1,7 +1,9 @@
-//! How users write sizes, rectangles and lengths of time on the command line.
+//! How users write sizes, rectangles and numbers on the command line.
 
 use model::rect::SIDE_MAX;
-use model::{Rect, Resolution, Span};
+use model::{Rect, Resolution};
+
+pub(crate) use model::words::{label, memory, span};
 
 /// Two whole numbers from 1 to the longest side of an image, as in `400x300`.
 pub(crate) fn resolution(text: &str) -> Result<Resolution, String> {
@@ -65,24 +67,6 @@ pub(crate) fn pixel(text: &str) -> Result<(u32, u32), String> {
     }
 }
 
-/// A size of memory: `512 MiB`, `4 GiB`; in bytes.
-pub(crate) fn memory(text: &str) -> Result<u64, String> {
-    let form = || format!("`{text}` is no size of memory: write it as 512 MiB or 4 GiB");
-    let text = text.trim();
-    let digits = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
-    let unit: u64 = match &text[digits.len()..] {
-        "MiB" => 1 << 20,
-        "GiB" => 1 << 30,
-        "TiB" => 1 << 40,
-        _ => return Err(form()),
-    };
-    let number: u64 = digits.trim().parse().map_err(|_| form())?;
-    number
-        .checked_mul(unit)
-        .filter(|&bytes| bytes > 0)
-        .ok_or_else(form)
-}
-
 /// A part of a whole in per cent, such as 0.5; in millionths.
 pub(crate) fn percent(text: &str) -> Result<u32, String> {
     let form = || format!("`{text}` is no part of a hundred: write it as 0.5, or 100 for all");
@@ -101,42 +85,6 @@ pub(crate) fn percent(text: &str) -> Result<u32, String> {
     match millionths {
         0..=1_000_000 => Ok(millionths),
         _ => Err(form()),
-    }
-}
-
-/// A label of workers: 1 to 64 bytes of letters, digits, `-`, `_`, `.`.
-pub(crate) fn label(text: &str) -> Result<String, String> {
-    let may_be = |letter: char| letter.is_ascii_alphanumeric() || "-_.".contains(letter);
-    if (1..=64).contains(&text.len()) && text.chars().all(may_be) {
-        Ok(text.to_owned())
-    } else {
-        Err(format!(
-            "`{text}` is no label: it has 1 to 64 letters, digits, `-`, `_` or `.`"
-        ))
-    }
-}
-
-/// A length of time: `1500 ms`, `4 s`, `2 min`, `12 h`, `30 d`.
-pub(crate) fn span(text: &str) -> Result<Span, String> {
-    let form =
-        || format!("`{text}` is no length of time: write it as 1500 ms, 4 s, 2 min, 12 h or 30 d");
-    let text = text.trim();
-    let digits = text.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
-    let milliseconds = match &text[digits.len()..] {
-        "ms" => 1,
-        "s" => 1_000,
-        "min" => 60_000,
-        "h" => 3_600_000,
-        "d" => 86_400_000,
-        _ => return Err(form()),
-    };
-    let number: u64 = digits.trim().parse().map_err(|_| form())?;
-    match number.checked_mul(milliseconds) {
-        // A year is more than anything here may take, and far from any overflow.
-        Some(total @ 1..=31_536_000_000) => Ok(Span::from_millis(total)),
-        _ => Err(format!(
-            "`{text}` is out of range: 1 ms to a year is possible"
-        )),
     }
 }
 
@@ -213,46 +161,16 @@ mod tests {
     }
 
     #[test]
-    fn lengths_of_time() {
-        assert_eq!(span("1500 ms"), Ok(Span::from_millis(1_500)));
-        assert_eq!(span("4s"), Ok(Span::from_secs(4)));
-        assert_eq!(span("2 min"), Ok(Span::from_secs(120)));
-        assert_eq!(span("12 h"), Ok(Span::from_secs(43_200)));
-        assert_eq!(span("1d"), Ok(Span::from_secs(86_400)));
-        for wrong in [
-            "",
-            "4",
-            "s",
-            "-4 s",
-            "4 weeks",
-            "0 s",
-            "99999999999999 min",
-            "4.5 s",
-        ] {
-            assert!(span(wrong).is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
-    fn pixels_memory_and_labels() {
+    fn pixels_and_parts() {
         assert_eq!(pixel("120,80"), Ok((120, 80)));
         for wrong in ["120", "a,1", "-1,2", "65536,0", ""] {
             assert!(pixel(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(memory("512 MiB"), Ok(512 << 20));
-        assert_eq!(memory("4GiB"), Ok(4 << 30));
-        for wrong in ["4", "0 GiB", "4 GB", "99999999999999 TiB", ""] {
-            assert!(memory(wrong).is_err(), "{wrong}");
         }
         assert_eq!(percent("0.5"), Ok(5_000));
         assert_eq!(percent("100 %"), Ok(1_000_000));
         assert_eq!(percent("0"), Ok(0));
         for wrong in ["", "-1", "100.1", "1.23456", "half", "1e2", "."] {
             assert!(percent(wrong).is_err(), "{wrong}");
-        }
-        assert_eq!(label("big-mem.2"), Ok("big-mem.2".to_owned()));
-        for wrong in ["", "a b", "é", &"x".repeat(65)] {
-            assert!(label(wrong).is_err(), "{wrong}");
         }
     }
 

@@ -47,6 +47,11 @@ pub(crate) struct Coordinator {
     #[arg(long, value_name = "PROGRAM")]
     on_job_end: Option<PathBuf>,
 
+    /// A file of sites, such as deploy/sites.toml in the source: clusters and hosts to which allocations of workers are
+    /// submitted as the jobs need them. `flyby site check` says what each is like.
+    #[arg(long, value_name = "FILE")]
+    sites: Option<PathBuf>,
+
     /// Takes the pixels of `bench farm` and no others; refused over any other state folder than its own.
     #[arg(long, hide = true)]
     null_renderer: bool,
@@ -71,6 +76,10 @@ pub(crate) fn run(context: &Context, options: &Coordinator) -> Result<Ending, Er
         // Four heartbeats may be missed, and one a second is enough.
         heartbeat_interval: Span((options.liveness.0 / 4).clamp(1_000, 1_000_000)),
         verify: options.verify,
+        sites: match &options.sites {
+            Some(path) => super::site::read(path)?.0,
+            None => Vec::new(),
+        },
         on_job_end: options.on_job_end.as_deref().map(program).transpose()?,
         ..usual
     };

@@ -6,7 +6,7 @@ use clap::{Args, Subcommand};
 use indicatif::HumanBytes;
 use model::Span;
 use serde::Serialize;
-use wire::proto::{self, FarmInfo, InfoRequest};
+use wire::proto::{self, FarmInfo, InfoRequest, ListSitesRequest, SiteList};
 
 use crate::error::{Ending, Error};
 use crate::farm::doctor::{self, Verdict};
@@ -14,6 +14,7 @@ use crate::farm::link::{block_on, refused};
 use crate::farm::view;
 use crate::options::{Context, FarmOptions};
 use crate::output::{self, Report, columns};
+use crate::site::view::SiteView;
 use crate::values;
 
 #[derive(Subcommand, Debug)]
@@ -105,12 +106,14 @@ struct FarmStatus {
     disk_free_bytes: Option<u64>,
     /// Bytes of that disk.
     disk_bytes: Option<u64>,
+    /// Its sites.
+    sites: Vec<SiteView>,
     /// What the coordinator waits for, where its disk is in trouble.
     trouble: Option<String>,
 }
 
-impl From<FarmInfo> for FarmStatus {
-    fn from(info: FarmInfo) -> Self {
+impl FarmStatus {
+    fn new(info: FarmInfo, sites: SiteList) -> Self {
         Self {
             build: info.build,
             revision: info.revision,
@@ -127,6 +130,7 @@ impl From<FarmInfo> for FarmStatus {
             undecided: info.undecided,
             disk_free_bytes: info.disk_free_bytes,
             disk_bytes: info.disk_bytes,
+            sites: sites.sites.into_iter().map(SiteView::from).collect(),
             trouble: Some(info.trouble).filter(|trouble| !trouble.is_empty()),
         }
     }
@@ -165,6 +169,13 @@ impl Report for FarmStatus {
                 HumanBytes(all)
             )?;
         }
+        for (index, site) in self.sites.iter().enumerate() {
+            let heading = if index == 0 { "sites" } else { "" };
+            writeln!(out, "  {heading:<8} {}", site.line())?;
+            if let Some(trouble) = site.trouble() {
+                writeln!(out, "           {trouble}")?;
+            }
+        }
         if self.undecided > 0 {
             writeln!(
                 out,
@@ -189,7 +200,12 @@ async fn status(context: &Context, options: &FarmOptions) -> Result<Ending, Erro
         .info(InfoRequest {})
         .await
         .map_err(|status| refused("cannot ask how the farm stands", status))?;
-    output::print(context.output, &FarmStatus::from(info.into_inner()))?;
+    let sites = farm
+        .list_sites(ListSitesRequest {})
+        .await
+        .map_err(|status| refused("cannot ask how the sites stand", status))?;
+    let status = FarmStatus::new(info.into_inner(), sites.into_inner());
+    output::print(context.output, &status)?;
     Ok(Ending::Done)
 }
 

@@ -11,8 +11,10 @@ mod job;
 mod noise;
 mod render;
 mod scene;
+mod site;
 mod submit;
 mod token;
+mod version;
 mod worker;
 
 use std::path::PathBuf;
@@ -77,6 +79,9 @@ enum Command {
     /// Your jobs: how they stand, their frames, their place among others.
     #[command(subcommand)]
     Job(job::JobCommand),
+    /// Clusters and hosts that `sites.toml` names: what they are like, the program there.
+    #[command(subcommand)]
+    Site(site::SiteCommand),
     /// Tokens, by which users and workers on other machines reach the farm.
     #[command(subcommand)]
     Token(token::TokenCommand),
@@ -97,6 +102,8 @@ enum Command {
     /// Measurements beside those of others.
     #[command(subcommand)]
     Bench(bench::BenchCommand),
+    /// What this program is and what this machine makes of it.
+    Version(version::Version),
     /// Prints a completion script for a shell.
     Completions(completions::Completions),
     /// Writes the manual pages.
@@ -117,6 +124,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Worker(command) => worker::run(&context, command),
         Command::Submit(options) => submit::run(&context, &options),
         Command::Job(command) => job::run(&context, command),
+        Command::Site(command) => site::run(&context, command),
         Command::Token(command) => token::run(&context, command),
         Command::Farm(command) => farm::run(&context, command),
         Command::Scene(command) => scene::run(&context, command),
@@ -124,6 +132,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Noise(command) => noise::run(&context, command),
         Command::Gallery(options) => gallery::run(&context, &options),
         Command::Bench(command) => bench::run(&context, command),
+        Command::Version(_) => version::run(&context),
         Command::Completions(options) => completions::completions(&options, Cli::command()),
         Command::Man(options) => completions::man(&options, Cli::command()),
     }

@@ -103,6 +103,10 @@ struct Worker {
     #[arg(long, value_name = "TIME", value_parser = values::span)]
     time_limit: Option<Span>,
 
+    /// Leaves when there was nothing to do for so long, such as 2 min.
+    #[arg(long, value_name = "TIME", value_parser = values::span)]
+    idle: Option<Span>,
+
     #[command(flatten)]
     daemon: DaemonOptions,
 }
@@ -187,6 +191,7 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         build: daemon::software(),
         memory_bytes: memory_bytes(),
         labels: options.label.clone(),
+        idle: options.idle,
         time_limit: options.time_limit,
         ..agent::Config::new(entry, name, threads.unwrap_or(NonZeroU32::MIN))
     };
@@ -206,7 +211,7 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         ended.map_err(cannot_run)
     })?;
     match ended {
-        ExitReason::Drained | ExitReason::Stopped => Ok(Ending::Done),
+        ExitReason::Drained | ExitReason::Stopped | ExitReason::Idle => Ok(Ending::Done),
         ExitReason::Refused { reason } => Err(Error::unreachable(format!(
             "the coordinator at {coordinator} refuses this worker"
         ))

@@ -48,12 +48,12 @@ pub(crate) struct Examination {
 
 /// One thing that was looked at.
 #[derive(Serialize)]
-struct Finding {
-    /// What: `state`, `token`, `store`, `authority`, `joined`, `coordinator`, `versions`, `clock`, `certificate`, `disk`,
+pub(crate) struct Finding {
+    /// What; of a farm `state`, `token`, `store`, `authority`, `joined`, `coordinator`, `versions`, `clock`, `certificate`, `disk`,
     /// `workers`, `pixels`.
     part: &'static str,
     /// How it stands.
-    verdict: Verdict,
+    pub(crate) verdict: Verdict,
     /// What was found, a sentence.
     found: String,
     /// What to do; null where nothing is.
@@ -61,7 +61,7 @@ struct Finding {
 }
 
 impl Finding {
-    fn fine(part: &'static str, found: impl Into<String>) -> Self {
+    pub(crate) fn fine(part: &'static str, found: impl Into<String>) -> Self {
         Self {
             part,
             verdict: Verdict::Fine,
@@ -70,7 +70,11 @@ impl Finding {
         }
     }
 
-    fn doubtful(part: &'static str, found: impl Into<String>, next: impl Into<String>) -> Self {
+    pub(crate) fn doubtful(
+        part: &'static str,
+        found: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Self {
         Self {
             part,
             verdict: Verdict::Doubtful,
@@ -79,7 +83,11 @@ impl Finding {
         }
     }
 
-    fn bad(part: &'static str, found: impl Into<String>, next: impl Into<String>) -> Self {
+    pub(crate) fn bad(
+        part: &'static str,
+        found: impl Into<String>,
+        next: impl Into<String>,
+    ) -> Self {
         Self {
             verdict: Verdict::Bad,
             ..Self::doubtful(part, found, next)
@@ -87,20 +95,25 @@ impl Finding {
     }
 }
 
+/// Writes findings for people, with what to do.
+pub(crate) fn write_findings(findings: &[Finding], out: &mut dyn Write) -> io::Result<()> {
+    for finding in findings {
+        let mark = match finding.verdict {
+            Verdict::Fine => "fine",
+            Verdict::Doubtful => "look",
+            Verdict::Bad => "BAD ",
+        };
+        writeln!(out, "{mark}  {:<12} {}", finding.part, finding.found)?;
+        if let Some(next) = &finding.next {
+            writeln!(out, "{:>19}{next}", "")?;
+        }
+    }
+    Ok(())
+}
+
 impl Report for Examination {
     fn table(&self, out: &mut dyn Write) -> io::Result<()> {
-        for finding in &self.findings {
-            let mark = match finding.verdict {
-                Verdict::Fine => "fine",
-                Verdict::Doubtful => "look",
-                Verdict::Bad => "BAD ",
-            };
-            writeln!(out, "{mark}  {:<12} {}", finding.part, finding.found)?;
-            if let Some(next) = &finding.next {
-                writeln!(out, "{:>19}{next}", "")?;
-            }
-        }
-        Ok(())
+        write_findings(&self.findings, out)
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {

@@ -1,4 +1,4 @@
-//! Every command that the README shows exists.
+//! Every command that the README shows exists, and every file is right.
 
 use crate::harness::Place;
 
@@ -71,11 +71,16 @@ fn its_files_are_there() {
 }
 
 #[test]
-fn its_scenes_are_right() {
+fn its_scenes_and_sites_are_right() {
     let (place, readme) = (Place::new(), readme());
     let mut count = 0;
     for block in readme.split("```toml").skip(1) {
         let block = block.split("```").next().unwrap();
+        if let Some(sites) = block.strip_prefix(" sites\n") {
+            place.write("sites.toml", sites);
+            place.flyby(["site", "list", "--sites", "sites.toml"]).ok();
+            continue;
+        }
         let camera = "[camera.fixed]\neye = [6371100, 0, 0]\ntarget = [6371000, 100, 0]\n";
         place.write("readme.toml", format!("{camera}{block}"));
         place.flyby(["scene", "check", "readme.toml"]).ok();

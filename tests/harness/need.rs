@@ -76,7 +76,8 @@ pub(crate) fn address() -> Option<IpAddr> {
     found
 }
 
-fn skip(name: &str, why: &str) {
+/// Says that a test is skipped, since this machine lacks what it needs; the test must return.
+pub(crate) fn skip(name: &str, why: &str) {
     assert!(
         std::env::var("CI").as_deref() != Ok("true"),
         "in CI nothing may be skipped, but: {name}: {why}"

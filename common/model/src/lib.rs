@@ -14,6 +14,7 @@ pub mod ids;
 pub mod lease;
 pub mod rect;
 pub mod time;
+pub mod words;
 
 pub use digest::Digest;
 pub use frames::FrameRange;

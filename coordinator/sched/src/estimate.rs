@@ -51,7 +51,7 @@ impl Sched {
     }
 
     /// What is left of a job is expected to cost, that with workers and what waits to be verified included, if anything was measured.
-    fn cost_left(&self, job: &Job) -> Option<u64> {
+    pub(crate) fn cost_left(&self, job: &Job) -> Option<u64> {
         let open = job.open_cost()?;
         let live = job.live().map(|number| {
             let attempt = &self.attempts[number];

@@ -25,6 +25,7 @@ mod check;
 mod command;
 mod config;
 mod costs;
+mod demand;
 mod effect;
 mod estimate;
 mod event;
@@ -60,6 +61,7 @@ mod wrong;
 
 pub use command::Command;
 pub use config::{Config, IMAGES_IN_FLIGHT_LEAST, Limits, TailGain};
+pub use demand::Demand;
 pub use effect::{Effect, JobOutcome, RevokeReason};
 pub use event::{BlockRef, Event, LinkId, Submission, TileShape};
 pub use needs::{Needs, Offer};

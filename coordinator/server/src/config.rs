@@ -29,6 +29,8 @@ pub struct Config {
     pub verify: u32,
     /// A program that is run whenever a job is over; `None`: none.
     pub on_job_end: Option<PathBuf>,
+    /// Sites that it submits to.
+    pub sites: Vec<cluster::Site>,
     /// Limits on what others may make it hold.
     pub limits: Limits,
 }
@@ -66,6 +68,7 @@ impl Config {
             liveness_limit: Span::from_secs(4),
             verify: 0,
             on_job_end: None,
+            sites: Vec::new(),
             limits: Limits::default(),
         }
     }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use bytes::Bytes;
 use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
-use sched::{BlockRef, Command, Event, LinkId};
+use sched::{BlockRef, Command, Event, LinkId, Offer};
 use store::Entry;
 use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc, oneshot};
 use tonic::Status;
@@ -105,6 +105,8 @@ pub(crate) enum Query {
     Why(WhyOf, Reply<proto::WhyReply>),
     /// The farm.
     Info(Reply<proto::FarmInfo>),
+    /// What is left to do for workers of a site, that offer so much and have this label.
+    Wanted(Offer, String, Reply<cluster::pilot::Wanted>),
 }
 
 /// What a user wants of a job.

@@ -10,6 +10,7 @@
 //! - `storage`: a thread that writes blocks at their place, makes them durable and keeps the store, and one
 //!   that encodes finished images. `about`, `scene_files`: what else is kept of a job.
 //! - `hook`: the operator's program that is run when a job is over.
+//! - `sites`: a thread for each cluster or host that allocations are submitted to.
 //! - `space`: what a job needs of the disk, and what the disk has.
 //! - `job`, `worker`: what is known of them beside what the scheduler knows: log, files,
 //!   watchers; links.
@@ -26,6 +27,7 @@ mod input;
 mod job;
 mod scene_files;
 mod shell;
+mod sites;
 mod space;
 mod start;
 mod state;

@@ -18,6 +18,7 @@ use crate::config::Config;
 use crate::grpc::{self, Door};
 use crate::input::{Input, News};
 use crate::shell::{Kept, Shell};
+use crate::sites::Sites;
 use crate::state::{State, StateError};
 use crate::storage::Storage;
 use crate::trust::{Trust, acceptor, addresses};
@@ -64,6 +65,9 @@ pub enum StartError {
     /// TLS cannot be set up.
     #[error("cannot set up TLS with the certificate authority of the state folder")]
     Tls(#[source] rustls::Error),
+    /// What this farm is called at its sites cannot be kept.
+    #[error(transparent)]
+    Sites(#[from] cluster::ClusterError),
     /// The system refused a thread.
     #[error("cannot start a thread")]
     Thread(#[source] io::Error),
@@ -110,11 +114,26 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
     let storage =
         Storage::start(news.clone(), Box::new(store), open).map_err(StartError::Thread)?;
     let jobs = kept.len();
-    let mut shell = Shell::new(config.clone(), state.clone(), Clock::start(), storage);
+    let addresses = addresses::of(&config.advertise, address);
+    let sites = Sites::start(&config, &state, (address, &addresses), &trust, &inputs)?;
+    let board = sites.board().clone();
+    let mut shell = Shell::new(
+        config.clone(),
+        state.clone(),
+        Clock::start(),
+        storage,
+        sites,
+    );
     shell.recall(kept);
     let shell = tokio::spawn(shell.run(heard, taken));
-    let addresses = addresses::of(&config.advertise, address);
-    let door = Door::new(inputs.clone(), config, state.clone(), trust, addresses);
+    let door = Door::new(
+        inputs.clone(),
+        config,
+        state.clone(),
+        trust,
+        addresses,
+        board,
+    );
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();
     let server = tokio::spawn(grpc::serve(connections, Arc::new(door), async {

@@ -7,6 +7,9 @@
 //! coordinator.json   where the running one listens on this machine
 //! authority.pem      the farm's certificate authority with its key, mode 0600
 //! tokens.json        tokens for other machines, without their secrets, mode 0600
+//! coordinator.json   where the running one listens
+//! farm               what this farm is called at its sites; there once it has some
+//! ssh/               connections to them that are open
 //! farm.sqlite        jobs, finished images, blocks of the others: what the `store` keeps
 //! jobs/arriving/     submissions, on the disk that they are to stay on; of this start only
 //! jobs/<job>/scene/    the scene and its assets

@@ -27,6 +27,8 @@ pub struct Config {
     pub memory_bytes: u64,
     /// Labels that jobs may ask for.
     pub labels: Vec<String>,
+    /// It leaves where it has nothing to do for so long; `None`: it waits for ever.
+    pub idle: Option<Span>,
     /// How long it may run from its start; it leaves in time. `None`: nobody set a limit.
     pub time_limit: Option<Span>,
 }
@@ -43,6 +45,7 @@ impl Config {
             build: String::new(),
             memory_bytes: 0,
             labels: Vec::new(),
+            idle: None,
             time_limit: None,
         }
     }

@@ -118,6 +118,7 @@ impl Shell {
             // What was asked for holds, whatever is measured.
             (settings.ahead, settings.ahead_least, settings.ahead_max) = (ahead, ahead, ahead);
         }
+        settings.idle = config.idle;
         settings.backoff.key = identity::draw()?;
         let images_max = (threads as usize).saturating_add(IMAGES_AHEAD);
         let images = Images::new(painter.clone(), images_max);

@@ -27,6 +27,8 @@ pub struct Config {
     pub give_up: Span,
     /// When to send a block again that was refused for a passing reason.
     pub resend_after: Span,
+    /// A worker that has nothing to do for so long leaves; `None`: it waits for ever.
+    pub idle: Option<Span>,
     /// How long a worker that was asked to stop waits for answers to the blocks it has rendered.
     pub stop_limit: Span,
 }
@@ -45,6 +47,7 @@ impl Config {
             connect_limit: Span::from_secs(10),
             give_up: Span::from_secs(24 * 3_600),
             resend_after: Span::from_secs(1),
+            idle: None,
             stop_limit: Span::from_secs(5),
         }
     }

@@ -88,6 +88,8 @@ pub enum ExitReason {
     Drained,
     /// It was asked to stop.
     Stopped,
+    /// It had nothing to do for as long as it may.
+    Idle,
     /// It was refused for good.
     Refused {
         /// The coordinator's sentence.

@@ -19,6 +19,7 @@ mod config;
 mod effect;
 mod event;
 mod held;
+mod idle;
 mod invariants;
 mod leave;
 mod link;

@@ -36,6 +36,8 @@ pub struct Session {
     /// The credit that the coordinator was told last.
     pub(crate) credit_told: u32,
     pub(crate) leaving: Leaving,
+    /// Since when there is nothing to do.
+    pub(crate) idle_since: Option<Timestamp>,
     pub(crate) tiles_delivered: u64,
     pub(crate) blocks_acked: u64,
 }
@@ -92,6 +94,7 @@ impl Session {
             ahead: Ahead::default(),
             credit_told: 0,
             leaving: Leaving::No,
+            idle_since: None,
             tiles_delivered: 0,
             blocks_acked: 0,
         }
@@ -133,6 +136,7 @@ impl Session {
             self.start_tiles(out);
             self.leave_if_done(out);
         }
+        self.note_idleness();
     }
 
     /// When an [`Event::Tick`] is next worth sending; `None` while nothing is pending.
@@ -146,6 +150,7 @@ impl Session {
             self.gives_up_at(),
             self.resends.first().map(|&(due, ..)| due),
             self.leaving.deadline(),
+            self.idle_until(),
         ]
         .into_iter()
         .flatten()
@@ -172,6 +177,9 @@ impl Session {
         if self.leaving != Leaving::Gone {
             self.resend_due(out);
             self.leaving_due(out);
+        }
+        if self.leaving == Leaving::No {
+            self.idle_due(out);
         }
     }
 }

@@ -33,6 +33,7 @@ use wire::{BadMessage, Failure, convert};
 use crate::config::Config;
 use crate::inbox::Inbox;
 use crate::input::{Input, Reply};
+use crate::sites::Board;
 use crate::space::Space;
 use crate::state::State;
 use crate::trust::Trust;
@@ -65,6 +66,7 @@ pub(crate) struct Door {
     submissions: Arc<Semaphore>,
     blocks: Arc<Semaphore>,
     watchers: Arc<Semaphore>,
+    sites: Board,
     next_link: AtomicU64,
 }
 
@@ -75,6 +77,7 @@ impl Door {
         state: Arc<State>,
         trust: Arc<Trust>,
         addresses: Vec<String>,
+        sites: Board,
     ) -> Self {
         let limits = &config.limits;
         Self {
@@ -85,6 +88,7 @@ impl Door {
             watchers: Arc::new(Semaphore::new(limits.watchers_max)),
             next_link: AtomicU64::new(1),
             loopback_only: config.listen.ip().is_loopback(),
+            sites,
             config,
             state,
             trust,

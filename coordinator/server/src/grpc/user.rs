@@ -203,6 +203,11 @@ impl Farm for Door {
         Ok(Response::new(workers))
     }
 
+    async fn list_sites(&self, _: Request<proto::ListSitesRequest>) -> Answer<proto::SiteList> {
+        let sites = self.sites.all();
+        Ok(Response::new(proto::SiteList { sites }))
+    }
+
     async fn info(&self, _: Request<proto::InfoRequest>) -> Answer<proto::FarmInfo> {
         let info = self.ask(|reply| Input::Ask(Query::Info(reply))).await?;
         let space = self.space().await;

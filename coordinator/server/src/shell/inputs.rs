@@ -38,8 +38,14 @@ impl Shell {
     /// Takes one input.
     pub(super) fn take(&mut self, input: Input) {
         match input {
-            Input::Submit(new, reply) => self.submit(new, reply),
-            Input::Command(job, wish, reply) => self.command(job, wish, reply),
+            Input::Submit(new, reply) => {
+                self.submit(new, reply);
+                self.sites.wake();
+            }
+            Input::Command(job, wish, reply) => {
+                self.command(job, wish, reply);
+                self.sites.wake();
+            }
             Input::Drain(whom, reply) => {
                 let _ = reply.send(self.drain(&whom));
             }

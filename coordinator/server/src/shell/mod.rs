@@ -31,6 +31,7 @@ use crate::hook::Hook;
 use crate::inbox::NewJob;
 use crate::input::{Frames, Input, News, Reply};
 use crate::job::{Job, Jobs};
+use crate::sites::Sites;
 use crate::state::State;
 use crate::storage::{Era, Hand, Storage};
 use crate::worker::{Leaving, Workers};
@@ -65,6 +66,7 @@ pub(crate) struct Shell {
     /// Jobs that users remove, until they are forgotten: what becomes of their frames, and what they were before.
     removing: BTreeMap<JobId, (Frames, proto::JobSummary)>,
     hook: Hook,
+    sites: Sites,
     held: Held,
     /// Eras of images that are not in their first.
     eras: BTreeMap<ImageRef, Era>,
@@ -106,11 +108,13 @@ impl Shell {
         state: Arc<State>,
         clock: Clock,
         storage: Storage,
+        sites: Sites,
     ) -> Self {
         let sched = Sched::new(scheduling(&config, state.epoch()));
         Self {
             hook: Hook::start(config.on_job_end.clone()),
             sched,
+            sites,
             clock,
             config,
             state,

@@ -1,6 +1,7 @@
 //! Answers to questions.
 
 use model::{Digest, ImageNumber, ImageRef, JobId};
+use sched::WhyJob;
 use std::path::PathBuf;
 use wire::Failure;
 use wire::proto::{self, ErrorKind};
@@ -61,6 +62,9 @@ impl Shell {
             Query::Info(reply) => {
                 let _ = reply.send(Ok(self.info()));
             }
+            Query::Wanted(offer, label, reply) => {
+                let _ = reply.send(Ok(self.wanted(&offer, &label)));
+            }
         }
     }
 
@@ -83,7 +87,16 @@ impl Shell {
         let sentence = match of {
             WhyOf::Job(job) => {
                 let why = self.sched.why_job(*job);
-                why.ok_or_else(|| views::no_job(*job))?.to_string()
+                let why = why.ok_or_else(|| views::no_job(*job))?;
+                let waits_for_workers = matches!(
+                    why,
+                    WhyJob::NoWorkers | WhyJob::NobodyServes { .. } | WhyJob::NobodyTakes { .. }
+                );
+                let sites = match waits_for_workers {
+                    true => self.sites.board().sentences(),
+                    false => String::new(),
+                };
+                format!("{why}{sites}")
             }
             WhyOf::Image(image) => self.why_image(*image)?.to_string(),
             WhyOf::Pixel(image, x, y) => self.why_pixel(*image, *x, *y)?,
@@ -99,6 +112,22 @@ impl Shell {
             None => sentence,
         };
         Ok(proto::WhyReply { sentence })
+    }
+
+    /// What workers of a site could do, and who else is there for it.
+    fn wanted(&self, offer: &sched::Offer, label: &str) -> cluster::pilot::Wanted {
+        let demand = self.sched.demand(offer);
+        let others = self.sched.workers().filter(|view| {
+            let worker = self.workers.get(&view.worker);
+            let is_of_site = worker.is_some_and(|worker| worker.about.labels.contains(label));
+            view.link == sched::Link::Open && view.aside.is_none() && !is_of_site
+        });
+        cluster::pilot::Wanted {
+            squares: demand.squares,
+            unmeasured: demand.unmeasured,
+            time: demand.time,
+            others: others.map(|view| u64::from(view.threads)).sum(),
+        }
     }
 
     fn why_image(&self, image: ImageRef) -> Result<sched::WhyImage, Failure> {

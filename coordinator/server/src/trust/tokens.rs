@@ -4,7 +4,7 @@
 //! durably and before anybody is answered: a token that was used up or revoked stays so, whatever happens. Whoever
 //! only asks looks at a snapshot, and never waits for the disk.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::{Arc, PoisonError, RwLock};
 
 use model::Digest;
@@ -167,6 +167,11 @@ impl Tokens {
 
     fn list(&self) -> Arc<List> {
         self.kept.list()
+    }
+
+    /// The file that holds them.
+    pub(crate) fn path(&self) -> &Path {
+        &self.kept.path
     }
 
     /// Changes the list, durably before it counts. Whoever asked may leave meanwhile: what was begun is ended.

@@ -65,7 +65,7 @@ impl Shell {
             }
             Effect::SendGoodbye => {
                 if let Some(link) = self.link.take() {
-                    link.leave("asked to leave").await;
+                    link.leave("it leaves by itself, or was asked to").await;
                 }
             }
             Effect::Exit { reason } => {

@@ -1,0 +1,495 @@
+//! Grid Engine: Sun's, Son of, Univa's and Open.
+
+use std::fmt::Write as _;
+
+use model::Span;
+use roxmltree::{Document, Node};
+
+use crate::error::{ClusterError, Refusal};
+use crate::queue::{About, Array, Limits, Queue, Task, TaskId, TaskState};
+use crate::sites::Site;
+use crate::tasks::numbers;
+use crate::template;
+use crate::way::{LIMIT, Way, brief};
+use crate::words::{quote, quote_all, quote_path};
+
+const TEMPLATE: &str = include_str!("../../../deploy/gridengine/array.sh");
+
+/// How long before its limit an allocation is told that it ends (`s_rt`).
+const NOTICE: Span = Span::from_secs(30);
+
+/// Shorter limits leave no time between the start and the notice.
+const NOTICE_FROM: Span = Span::from_secs(300);
+
+pub(crate) struct GridEngine {
+    site: Site,
+    way: Way,
+}
+
+impl GridEngine {
+    pub(crate) fn new(site: Site, way: Way) -> Self {
+        Self { site, way }
+    }
+}
+
+impl Queue for GridEngine {
+    fn about(&self) -> Result<About, ClusterError> {
+        let script = "qstat -help | head -n 1";
+        let said = self
+            .way
+            .ask("asking Grid Engine for its version", "qstat", script)?;
+        let version = said.trim();
+        if version.is_empty() {
+            return Err(ClusterError::Missing {
+                program: "qstat".to_owned(),
+                said: "it says no version".to_owned(),
+            });
+        }
+        Ok(About {
+            name: "Grid Engine".to_owned(),
+            version: version.to_owned(),
+        })
+    }
+
+    fn limits(&self) -> Result<Limits, ClusterError> {
+        let queue = match &self.site.queue {
+            Some(queue) => format!("qconf -sq {}", quote(queue)),
+            None => "qconf -sq \"$(qconf -sql | head -n 1)\"".to_owned(),
+        };
+        let script = format!(
+            "qconf -sconf && echo == && qconf -ssconf && echo == && qconf -sql && echo == && {queue} && echo == && qstat -g c -xml"
+        );
+        let said = self
+            .way
+            .ask("asking Grid Engine for its limits", "qconf", &script)?;
+        Ok(limits(&said, self.site.queue.as_deref()))
+    }
+
+    fn submit(&self, array: &Array) -> Result<TaskId, ClusterError> {
+        let script = template::fill(TEMPLATE, self.site.template.as_deref(), &array.script)?;
+        let script = submission(&self.site, array, &script);
+        let attempt = format!("submitting {} to Grid Engine", array.name);
+        let said = self.way.ask(&attempt, "qsub", &script)?;
+        // Its range stands behind the number; a site's own words may stand before.
+        let line = said
+            .lines()
+            .map(str::trim)
+            .rfind(|line| !line.is_empty())
+            .unwrap_or_default();
+        let id = line.split('.').next().unwrap_or_default();
+        match !id.is_empty() && id.chars().all(|digit| digit.is_ascii_digit()) {
+            true => Ok(TaskId::whole(id)),
+            false => Err(ClusterError::Nonsense {
+                attempt,
+                what: "no number of a job".to_owned(),
+                said: brief(&said),
+            }),
+        }
+    }
+
+    fn list(&self, prefix: &str) -> Result<Vec<Task>, ClusterError> {
+        let attempt = "asking Grid Engine for its jobs";
+        let said = self
+            .way
+            .ask(attempt, "qstat", "qstat -xml -u \"$(id -un)\"")?;
+        tasks(&said, prefix).map_err(|what| ClusterError::Nonsense {
+            attempt: attempt.to_owned(),
+            what,
+            said: brief(&said),
+        })
+    }
+
+    fn ended(&self, arrays: &[TaskId]) -> Result<Vec<Task>, ClusterError> {
+        // It knows no job that never ran, and says so as a failure.
+        let mut script = String::new();
+        for id in arrays {
+            let _ = writeln!(script, "qacct -j {} 2>/dev/null || :", quote(&id.array));
+        }
+        script.push(':');
+        let said = self
+            .way
+            .ask("asking Grid Engine what has ended", "qacct", &script)?;
+        Ok(accounts(&said))
+    }
+
+    fn delete(&self, tasks: &[TaskId]) -> Result<(), ClusterError> {
+        if tasks.is_empty() {
+            return Ok(());
+        }
+        let jobs = tasks.iter().map(TaskId::to_string);
+        let attempt = "deleting jobs of Grid Engine";
+        let said = self
+            .way
+            .run(attempt, &format!("qdel {}", quote_all(jobs)), LIMIT)?;
+        // It fails where any of them is gone; of the others it has said what it does.
+        let are_gone = said.stdout.lines().chain(said.stderr.lines()).all(|line| {
+            [
+                "does not exist",
+                "do not exist",
+                "has registered",
+                "has deleted",
+                "is already in deletion",
+            ]
+            .iter()
+            .any(|words| line.contains(words))
+                || line.trim().is_empty()
+        });
+        match said.code {
+            Some(0) => Ok(()),
+            Some(127) => Err(said.refused(attempt, "qdel")),
+            _ if are_gone => Ok(()),
+            _ => {
+                let words = brief(&format!("{}\n{}", said.stdout, said.stderr));
+                Err(ClusterError::Refused {
+                    attempt: attempt.to_owned(),
+                    refusal: Refusal::of(&words),
+                    said: words,
+                })
+            }
+        }
+    }
+}
+
+/// The script that submits an array.
+fn submission(site: &Site, array: &Array, script: &str) -> String {
+    let mut options: Vec<String> = Vec::new();
+    let mut add = |words: &[&str]| options.extend(words.iter().map(|&word| word.to_owned()));
+    add(&["-terse", "-N", &array.name, "-S", "/bin/sh", "-j", "y"]);
+    add(&["-t", &format!("1-{}", array.tasks)]);
+    // A host that fails gives its tasks back; one that is deleted is told before.
+    add(&["-r", "y", "-notify"]);
+    if let Some(running) = array.running_max {
+        add(&["-tc", &running.to_string()]);
+    }
+    if let Some(limit) = array.time_limit {
+        add(&["-l", &format!("h_rt={}", limit.0.div_ceil(1_000_000))]);
+        if limit >= NOTICE_FROM {
+            add(&[
+                "-l",
+                &format!("s_rt={}", (limit.0 - NOTICE.0).div_ceil(1_000_000)),
+            ]);
+        }
+    }
+    if let Some(bytes) = site.memory_bytes {
+        add(&["-l", &format!("mem_free={}M", bytes.div_ceil(1 << 20))]);
+    }
+    if let (Some(environment), 2..) = (&site.parallel_environment, site.threads) {
+        add(&["-pe", environment, &site.threads.to_string()]);
+    }
+    if let Some(queue) = &site.queue {
+        add(&["-q", queue]);
+    }
+    if let Some(account) = &site.account {
+        add(&["-P", account]);
+    }
+    options.extend(site.submit.iter().cloned());
+    let log = quote_path(&array.log.replace('%', "$TASK_ID"));
+    let end = template::END;
+    let options = quote_all(options);
+    format!("mkdir -p \"$(dirname {log})\" && qsub {options} -o {log} <<'{end}'\n{script}{end}\n")
+}
+
+/// What `qstat -xml` printed, of the names that begin so.
+fn tasks(said: &str, prefix: &str) -> Result<Vec<Task>, String> {
+    let document = Document::parse(said.trim_start()).map_err(|error| error.to_string())?;
+    let mut tasks = Vec::new();
+    for job in document
+        .descendants()
+        .filter(|node| node.has_tag_name("job_list"))
+    {
+        let (Some(array), Some(name)) = (text(job, "JB_job_number"), text(job, "JB_name")) else {
+            return Err("a job without number or name".to_owned());
+        };
+        if !name.starts_with(prefix) {
+            continue;
+        }
+        let state = state_of(
+            array,
+            text(job, "state").unwrap_or_default(),
+            text(job, "queue_name"),
+        );
+        let Some(numbers) = numbers(text(job, "tasks").unwrap_or("1")) else {
+            return Err(format!("tasks of job {array} that are no numbers"));
+        };
+        tasks.extend(numbers.into_iter().map(|number| Task {
+            id: TaskId::task(array, number),
+            name: name.to_owned(),
+            state: state.clone(),
+        }));
+    }
+    Ok(tasks)
+}
+
+fn text<'a>(node: Node<'a, 'a>, name: &str) -> Option<&'a str> {
+    let child = node.children().find(|child| child.has_tag_name(name))?;
+    child.text().map(str::trim)
+}
+
+/// A job's state is a few letters, of which the graver count first.
+fn state_of(array: &str, letters: &str, queue: Option<&str>) -> TaskState {
+    let has = |letter: char| letters.contains(letter);
+    if has('d') {
+        TaskState::Ending
+    } else if has('E') {
+        TaskState::Held {
+            why: format!(
+                "error state {letters}: `qstat -j {array}` says why, `qmod -cj {array}` lets it go on"
+            ),
+        }
+    } else if has('h') {
+        TaskState::Held {
+            why: format!("held: {letters}"),
+        }
+    } else if has('q') || has('w') {
+        TaskState::Waiting { why: String::new() }
+    } else {
+        let host = queue
+            .and_then(|queue| queue.split_once('@'))
+            .map_or("", |(_, host)| host);
+        TaskState::Running {
+            host: host.to_owned(),
+        }
+    }
+}
+
+/// What `qacct -j` printed; of a task that was begun several times the last counts.
+fn accounts(said: &str) -> Vec<Task> {
+    let mut tasks: Vec<Task> = Vec::new();
+    for record in said.split("====\n") {
+        let value = |name: &str| {
+            let line = record
+                .lines()
+                .find_map(|line| line.strip_prefix(name)?.strip_prefix(' '));
+            line.map(str::trim)
+        };
+        let (Some(array), Some(name)) = (value("jobnumber"), value("jobname")) else {
+            continue;
+        };
+        // A job that is no array says "undefined".
+        let number = value("taskid")
+            .and_then(|task| task.parse().ok())
+            .unwrap_or(1);
+        let id = TaskId::task(array, number);
+        let failed = value("failed").unwrap_or("0");
+        let (code, words) = failed.split_once(':').unwrap_or((failed, ""));
+        let exit = value("exit_status").unwrap_or("0");
+        let exit = exit.split_whitespace().next().unwrap_or("0");
+        let state = match (code.trim(), exit) {
+            // It went back to the queue.
+            ("25", _) => continue,
+            ("37", _) => TaskState::TimeLimit,
+            // Killed while it ran: by whoever deleted it.
+            ("100", "137" | "138" | "140" | "143") => TaskState::Deleted,
+            ("0" | "100", "0") => TaskState::Done,
+            ("0" | "100", exit) => TaskState::Failed {
+                how: format!("exit status {exit}"),
+            },
+            ("22" | "23" | "24", _) => TaskState::Lost {
+                how: words.trim().to_owned(),
+            },
+            (code, _) => TaskState::Failed {
+                how: match words.trim() {
+                    "" => format!("failure {code}"),
+                    words => words.to_owned(),
+                },
+            },
+        };
+        tasks.retain(|task| task.id != id);
+        tasks.push(Task {
+            id,
+            name: name.to_owned(),
+            state,
+        });
+    }
+    tasks
+}
+
+/// What `qconf` and `qstat -g c` printed, apart by `==`.
+fn limits(said: &str, queue: Option<&str>) -> Limits {
+    let mut parts = said.split("==\n");
+    let mut part = || parts.next().unwrap_or_default();
+    let (config, scheduler, queues, chosen, summary) = (part(), part(), part(), part(), part());
+    fn value<'a>(text: &'a str, name: &str) -> Option<&'a str> {
+        text.lines().find_map(|line| {
+            let (key, value) = line.split_once(char::is_whitespace)?;
+            (key == name).then(|| value.trim())
+        })
+    }
+    // Where there is no limit it says 0.
+    let number = |text, name| {
+        let number = value(text, name).and_then(|digits| digits.parse().ok());
+        number.filter(|&number: &u32| number > 0)
+    };
+    let chosen_name = value(chosen, "qname").or(queue);
+    let mut queues: Vec<String> = queues.lines().map(|line| line.trim().to_owned()).collect();
+    queues.retain(|queue| !queue.is_empty());
+    queues.sort_by_key(|queue| Some(queue.as_str()) != chosen_name);
+    let time = value(chosen, "h_rt").and_then(duration);
+    Limits {
+        array_tasks: number(config, "max_aj_tasks"),
+        array_running: number(config, "max_aj_instances"),
+        running: number(scheduler, "maxujobs"),
+        jobs: number(config, "max_u_jobs").or_else(|| number(config, "max_jobs")),
+        time,
+        time_usual: time,
+        queues,
+        slots: slots(summary, chosen_name),
+    }
+}
+
+/// Slots of a queue that are free, and that there are.
+fn slots(summary: &str, queue: Option<&str>) -> Option<(u32, u32)> {
+    let document = Document::parse(summary.trim()).ok()?;
+    let queue = document.descendants().find(|node| {
+        node.has_tag_name("cluster_queue_summary")
+            && (queue.is_none() || text(*node, "name") == queue)
+    })?;
+    let number = |name| text(queue, name).and_then(|digits| digits.parse().ok());
+    Some((number("available")?, number("total")?))
+}
+
+/// `hours:minutes:seconds` or seconds; `None` where there is no limit.
+fn duration(text: &str) -> Option<Span> {
+    // What holds on some hosts alone stands behind a comma.
+    let text = text.split(',').next()?;
+    let mut seconds = 0_u64;
+    for part in text.split(':') {
+        seconds = seconds.checked_mul(60)?.checked_add(part.parse().ok()?)?;
+    }
+    seconds.checked_mul(1_000_000).map(Span)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sites;
+
+    const QSTAT: &str = include_str!("../tests/recorded/sge-8.1.9-qstat.xml");
+    const ERRORS: &str = include_str!("../tests/recorded/sge-8.1.9-qstat-errors.xml");
+    const QACCT: &str = include_str!("../tests/recorded/sge-8.1.9-qacct.txt");
+
+    #[test]
+    fn jobs_of_grid_engine_8_1_9() {
+        let tasks = tasks(QSTAT, "flyby-ab-").unwrap();
+        assert_eq!(tasks.len(), 8, "a job of another name stands among them");
+        let running = |host: &str| TaskState::Running { host: host.into() };
+        for (task, host) in [(1, "ge1"), (2, "ge2"), (3, "ge2"), (4, "ge1")] {
+            let found = tasks.iter().find(|each| each.id == TaskId::task("1", task));
+            assert_eq!(found.unwrap().state, running(host));
+        }
+        for task in 5..=8 {
+            let found = tasks.iter().find(|each| each.id == TaskId::task("1", task));
+            assert_eq!(
+                found.unwrap().state,
+                TaskState::Waiting { why: String::new() }
+            );
+        }
+    }
+
+    #[test]
+    fn held_and_broken_jobs_say_what_to_do() {
+        let tasks = tasks(ERRORS, "flyby-ab-").unwrap();
+        let why = |array: &str| {
+            let found = tasks.iter().find(|task| task.id.array == array).unwrap();
+            match &found.state {
+                TaskState::Held { why } => why.clone(),
+                other => panic!("{other:?}"),
+            }
+        };
+        assert!(why("10").contains("qmod -cj 10"), "{}", why("10"));
+        assert!(why("9").contains("hqw"));
+        assert_eq!(state_of("1", "dr", None), TaskState::Ending);
+        assert_eq!(
+            state_of("1", "Rq", None),
+            TaskState::Waiting { why: String::new() }
+        );
+        assert!(matches!(
+            state_of("1", "Rr", Some("all.q@a")),
+            TaskState::Running { .. }
+        ));
+    }
+
+    #[test]
+    fn what_is_no_xml_is_an_answer() {
+        assert!(tasks("error: commlib error", "").is_err());
+        assert!(tasks("<a><job_list></job_list></a>", "").is_err());
+        let wrong = "<a><job_list><JB_job_number>1</JB_job_number><JB_name>x</JB_name><tasks>1-</tasks></job_list></a>";
+        assert!(tasks(wrong, "x").is_err());
+    }
+
+    #[test]
+    fn accounts_of_grid_engine_8_1_9() {
+        let tasks = accounts(QACCT);
+        let state = |array: &str, task| {
+            let id = TaskId::task(array, task);
+            tasks
+                .iter()
+                .find(|each| each.id == id)
+                .map(|task| task.state.clone())
+        };
+        assert_eq!(state("6", 1), Some(TaskState::Done));
+        let how = "exit status 7".to_owned();
+        assert_eq!(state("6", 2), Some(TaskState::Failed { how }));
+        assert_eq!(state("7", 1), Some(TaskState::TimeLimit));
+        assert_eq!(state("8", 1), Some(TaskState::Deleted));
+        let how = "opening input/output file".to_owned();
+        assert_eq!(state("10", 1), Some(TaskState::Failed { how }));
+    }
+
+    #[test]
+    fn a_task_that_was_begun_again_counts_as_it_ended() {
+        let record = |failed: &str, exit: &str| {
+            format!("====\njobname a\njobnumber 5\ntaskid 2\nfailed {failed}\nexit_status {exit}\n")
+        };
+        let said = record("25 : rescheduling", "99") + &record("0", "0");
+        assert_eq!(accounts(&said).len(), 1);
+        assert_eq!(accounts(&said)[0].state, TaskState::Done);
+    }
+
+    #[test]
+    fn limits_of_grid_engine_8_1_9() {
+        let said = [
+            include_str!("../tests/recorded/sge-8.1.9-conf.txt"),
+            include_str!("../tests/recorded/sge-8.1.9-sconf.txt"),
+            "all.q\nlong.q\n",
+            include_str!("../tests/recorded/sge-8.1.9-queue.txt"),
+            include_str!("../tests/recorded/sge-8.1.9-summary.xml"),
+        ]
+        .join("==\n");
+        let found = limits(&said, None);
+        assert_eq!(
+            (found.array_tasks, found.array_running),
+            (Some(75_000), Some(2_000))
+        );
+        assert_eq!((found.running, found.jobs, found.time), (None, None, None));
+        assert_eq!(found.queues, ["all.q", "long.q"]);
+        assert_eq!(found.slots.unwrap().1, 4);
+        let snowdon =
+            "max_aj_tasks 75000\n==\nmaxujobs  4\n==\nq\n==\nqname q\nh_rt 8:00:00,[x=1:0:0]\n==\n";
+        let found = limits(snowdon, Some("q"));
+        assert_eq!(
+            (found.running, found.time),
+            (Some(4), Some(Span::from_secs(28_800)))
+        );
+    }
+
+    #[test]
+    fn a_submission_quotes_every_value() {
+        let text = "[site.a]\nkind = 'gridengine'\nthreads = 4\nparallel_environment = 'smp'\nsubmit = ['-l', 'a b']\ntime_limit = '10 min'\nqueue = 'all.q'\n";
+        let site = sites::parse("s", text, None).unwrap().0.remove(0);
+        let array = Array {
+            name: "flyby-ab-1".into(),
+            tasks: 3,
+            running_max: None,
+            script: "true".into(),
+            time_limit: site.time_limit,
+            log: "/scratch/x-%.log".into(),
+        };
+        assert_eq!(
+            submission(&site, &array, "true\n"),
+            "mkdir -p \"$(dirname '/scratch/x-$TASK_ID.log')\" && qsub -terse -N flyby-ab-1 -S /bin/sh -j y -t 1-3 -r y -notify \
+             -l h_rt=600 -l s_rt=570 -pe smp 4 -q all.q -l 'a b' -o '/scratch/x-$TASK_ID.log' \
+             <<'END_OF_FLYBY_SCRIPT'\ntrue\nEND_OF_FLYBY_SCRIPT\n"
+        );
+    }
+}

@@ -1,0 +1,459 @@
+//! Scripts run at a site: here, or over the system's ssh, so that its configuration, agents and jump hosts work.
+//!
+//! A script travels on standard input, as one group in braces: a link that is cut in the middle leaves a group that
+//! does not end, of which a shell runs nothing. What is printed counts from a mark on, so that a login that greets
+//! everybody disturbs nothing. Time and output are limited.
+
+use std::fs::DirBuilder;
+use std::io::{self, Read, Write as _};
+use std::os::unix::fs::DirBuilderExt as _;
+use std::os::unix::process::CommandExt as _;
+use std::path::Path;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{self, Receiver};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use model::Span;
+use rustix::process::{Pid, Signal, kill_process_group};
+
+use crate::error::{ClusterError, Refusal};
+use crate::sites::Site;
+use crate::words::quote_path;
+
+/// How long most scripts may take.
+pub const LIMIT: Span = Span::from_secs(60);
+
+/// Most bytes that a script may print; a queue of 100,000 tasks of ours is 8 MiB.
+const STDOUT_MAX: usize = 32 << 20;
+
+/// Most bytes of what it says is wrong.
+const STDERR_MAX: usize = 64 << 10;
+
+/// Most bytes of what somebody said that are part of a message.
+const SAID_MAX: usize = 2_000;
+
+/// How long the output of a script that has ended may still come: somebody whom it left behind may hold it open.
+const LATE: Duration = Duration::from_secs(1);
+
+/// A Unix socket's path may have about a hundred bytes, and ssh adds seventeen while it makes one.
+const SOCKET_PATH_MAX: usize = 80;
+
+/// What is printed first.
+const MARK: &str = "--flyby--";
+
+/// The way to a site.
+#[derive(Clone, Debug)]
+pub struct Way {
+    address: Option<String>,
+    /// All options of ssh.
+    ssh: Vec<String>,
+    setup: Option<String>,
+}
+
+/// What a script said.
+#[derive(Debug)]
+pub struct Said {
+    /// How it ended; `None` where a signal killed it.
+    pub code: Option<i32>,
+    /// What it printed.
+    pub stdout: String,
+    /// What it says is wrong.
+    pub stderr: String,
+}
+
+impl Way {
+    /// The way to a site; connections are shared by sockets in a folder, which is made.
+    pub fn to(site: &Site, sockets: &Path) -> Self {
+        let mut ssh = site.ssh_options.clone();
+        for option in [
+            "BatchMode=yes",
+            "ConnectTimeout=10",
+            "ServerAliveInterval=5",
+            "ServerAliveCountMax=3",
+        ] {
+            ssh.extend(["-o".to_owned(), option.to_owned()]);
+        }
+        if let Some(address) = &site.address {
+            let whom = blake3::hash(format!("{address}\0{}", ssh.join("\0")).as_bytes());
+            let socket = sockets.join(&whom.to_hex()[..12]);
+            let made = DirBuilder::new()
+                .recursive(true)
+                .mode(0o700)
+                .create(sockets);
+            let socket = socket.to_str().filter(|path| path.len() <= SOCKET_PATH_MAX);
+            // Without a place for them every script logs in anew: slower, and no less right.
+            if let (Some(socket), Ok(())) = (socket, made) {
+                // ssh takes % for one of its own words.
+                let path = format!("ControlPath={}", socket.replace('%', "%%"));
+                for option in ["ControlMaster=auto", "ControlPersist=60", &path] {
+                    ssh.extend(["-o".to_owned(), option.to_owned()]);
+                }
+            }
+        }
+        Self {
+            address: site.address.clone(),
+            ssh,
+            setup: site.setup.clone(),
+        }
+    }
+
+    /// Runs a script of POSIX shell there. An error is that it did not run; how it ended is for the caller.
+    pub fn run(&self, attempt: &str, script: &str, limit: Span) -> Result<Said, ClusterError> {
+        let setup = self.setup.as_deref().unwrap_or(":");
+        let group = format!("{{\n{setup}\necho {MARK}\n{script}\n}} </dev/null\n");
+        let command = self.command("exec /bin/sh -s", &["-s"]);
+        let said = self.perform(attempt, command, group.into_bytes().as_slice(), limit)?;
+        let (before, stdout) = match said.stdout.split_once(&format!("{MARK}\n")) {
+            Some((_, after)) => (None, after.to_owned()),
+            None => (Some(said.stdout.as_str()), String::new()),
+        };
+        match before {
+            // The setup ended the shell, or nobody runs scripts there.
+            Some(words) => {
+                let words = format!("{words}\n{}", said.stderr);
+                Err(ClusterError::Nonsense {
+                    attempt: attempt.to_owned(),
+                    what: "the shell there ended before it began; look at the site's `setup`"
+                        .to_owned(),
+                    said: brief(&words),
+                })
+            }
+            None => Ok(Said { stdout, ..said }),
+        }
+    }
+
+    /// [`Way::run`], where the script must end well; `program` is what it needs there.
+    pub(crate) fn ask(
+        &self,
+        attempt: &str,
+        program: &str,
+        script: &str,
+    ) -> Result<String, ClusterError> {
+        let said = self.run(attempt, script, LIMIT)?;
+        match said.code {
+            Some(0) => Ok(said.stdout),
+            _ => Err(said.refused(attempt, program)),
+        }
+    }
+
+    /// Puts a file of `bytes` bytes there, whole or not at all.
+    pub fn put(
+        &self,
+        mut from: impl Read + Send,
+        bytes: u64,
+        path: &str,
+        mode: u32,
+        limit: Span,
+    ) -> Result<(), ClusterError> {
+        let attempt = format!("copying {path}");
+        let path = quote_path(path);
+        // A link that is cut looks there like the end of the file: hence the count.
+        let script = format!(
+            "umask 077; d=$(dirname {path}) && mkdir -p \"$d\" && t={path}.part.$$ && \
+             if cat >\"$t\" && [ $(wc -c <\"$t\") -eq {bytes} ] && chmod {mode:o} \"$t\" && mv -f \"$t\" {path}; \
+             then exit 0; else rm -f \"$t\"; exit 1; fi"
+        );
+        let there = format!("exec /bin/sh -c {}", quote_always(&script));
+        let command = self.command(&there, &["-c", &script]);
+        let said = self.perform(&attempt, command, &mut from, limit)?;
+        match said.code {
+            Some(0) => Ok(()),
+            _ => Err(said.refused(&attempt, "cat")),
+        }
+    }
+
+    fn command(&self, there: &str, here: &[&str]) -> Command {
+        match &self.address {
+            Some(address) => {
+                let mut command = Command::new("ssh");
+                command.args(&self.ssh).args(["-T", "--", address, there]);
+                command
+            }
+            None => {
+                let mut command = Command::new("/bin/sh");
+                command.args(here);
+                command
+            }
+        }
+    }
+
+    fn perform(
+        &self,
+        attempt: &str,
+        mut command: Command,
+        input: impl Read + Send,
+        limit: Span,
+    ) -> Result<Said, ClusterError> {
+        let deadline = Instant::now() + Duration::from_micros(limit.0);
+        let program = command.get_program().to_string_lossy().into_owned();
+        let child = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .spawn()
+            .map_err(|source| ClusterError::Start { program, source })?;
+        let mut child = Group(child);
+        let stdout = Gathered::from(child.0.stdout.take(), STDOUT_MAX);
+        let stderr = Gathered::from(child.0.stderr.take(), STDERR_MAX);
+        let stdin = child.0.stdin.take();
+        let ended = thread::scope(|scope| {
+            scope.spawn(move || {
+                let mut input = input;
+                if let Some(mut stdin) = stdin {
+                    // Whoever ends before it has read all says why by how it ended.
+                    let _ = io::copy(&mut input, &mut stdin).and_then(|_| stdin.flush());
+                }
+            });
+            child.wait(deadline, &stdout)
+        });
+        let Some(status) = ended else {
+            return Err(ClusterError::TimedOut {
+                attempt: attempt.to_owned(),
+                limit,
+            });
+        };
+        let said = Said {
+            code: status.code(),
+            stdout: stdout.text(),
+            stderr: stderr.text(),
+        };
+        if stdout.is_full() {
+            return Err(ClusterError::Nonsense {
+                attempt: attempt.to_owned(),
+                what: format!("it is longer than {STDOUT_MAX} bytes"),
+                said: brief(&said.stdout),
+            });
+        }
+        match (&self.address, said.code) {
+            // Of its own troubles ssh tells by this code alone.
+            (Some(address), Some(255)) => Err(not_there(address, &said.stderr)),
+            _ => Ok(said),
+        }
+    }
+}
+
+impl Said {
+    /// That it did not end well, as the error of whoever asked for it.
+    pub(crate) fn refused(&self, attempt: &str, program: &str) -> ClusterError {
+        let said = match self.stderr.trim().is_empty() {
+            true => brief(&self.stdout),
+            false => brief(&self.stderr),
+        };
+        if self.code == Some(127) {
+            return ClusterError::Missing {
+                program: program.to_owned(),
+                said,
+            };
+        }
+        ClusterError::Refused {
+            attempt: attempt.to_owned(),
+            refusal: Refusal::of(&said),
+            said: match said.is_empty() {
+                true => format!("it ended with {:?} and said nothing", self.code),
+                false => said,
+            },
+        }
+    }
+}
+
+/// What ssh says when it does not get there.
+fn not_there(address: &str, stderr: &str) -> ClusterError {
+    let (address, said) = (address.to_owned(), brief(stderr));
+    if said.contains("Host key verification failed") || said.contains("IDENTIFICATION HAS CHANGED")
+    {
+        ClusterError::HostKey { address, said }
+    } else if said.contains("Permission denied") || said.contains("Too many authentication") {
+        ClusterError::Login { address, said }
+    } else {
+        ClusterError::Unreachable { address, said }
+    }
+}
+
+/// The words that matter of what was said, in one line: the last ones, since what went wrong is said last.
+pub(crate) fn brief(text: &str) -> String {
+    let lines = text
+        .lines()
+        .map(str::trim)
+        .filter(|line| !line.is_empty() && !line.starts_with("@@@"));
+    let line = lines.collect::<Vec<_>>().join("; ");
+    let line: String = line.chars().filter(|letter| !letter.is_control()).collect();
+    let mut from = line.len().saturating_sub(SAID_MAX);
+    while !line.is_char_boundary(from) {
+        from += 1;
+    }
+    line[from..].to_owned()
+}
+
+/// A word in quotes, whatever it holds.
+fn quote_always(text: &str) -> String {
+    format!("'{}'", text.replace('\'', r"'\''"))
+}
+
+/// A process that is killed, with all in its group, where it is dropped before it was waited for.
+struct Group(Child);
+
+impl Group {
+    /// How it ended; `None` where that is too late, or it prints too much.
+    fn wait(&mut self, deadline: Instant, stdout: &Gathered) -> Option<ExitStatus> {
+        let mut pause = Duration::from_millis(1);
+        loop {
+            match self.0.try_wait() {
+                Ok(Some(status)) => return Some(status),
+                Ok(None) if Instant::now() < deadline && !stdout.is_full() => {
+                    thread::sleep(pause);
+                    pause = (pause * 2).min(Duration::from_millis(20));
+                }
+                _ => break,
+            }
+        }
+        self.kill();
+        let status = self.0.wait().ok();
+        status.filter(|_| stdout.is_full())
+    }
+
+    fn kill(&self) {
+        let leader = i32::try_from(self.0.id()).ok();
+        if let Some(group) = leader.and_then(Pid::from_raw) {
+            let _ = kill_process_group(group, Signal::KILL);
+        }
+    }
+}
+
+/// What comes out of a pipe, up to a limit, gathered by a thread.
+struct Gathered {
+    bytes: Arc<Mutex<Vec<u8>>>,
+    ended: Receiver<()>,
+    most: usize,
+}
+
+impl Gathered {
+    fn from(pipe: Option<impl Read + Send + 'static>, most: usize) -> Self {
+        let bytes = Arc::<Mutex<Vec<u8>>>::default();
+        let (end, ended) = mpsc::channel();
+        let into = bytes.clone();
+        thread::spawn(move || {
+            let mut chunk = [0; 8_192];
+            let Some(mut pipe) = pipe else { return };
+            while let Ok(count @ 1..) = pipe.read(&mut chunk) {
+                let mut into = into.lock().unwrap_or_else(PoisonError::into_inner);
+                // What is over the limit is read and dropped, so that nobody waits for a reader.
+                if into.len() < most {
+                    into.extend_from_slice(&chunk[..count]);
+                }
+            }
+            let _ = end.send(());
+        });
+        Self { bytes, ended, most }
+    }
+
+    fn is_full(&self) -> bool {
+        let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        bytes.len() >= self.most
+    }
+
+    fn text(&self) -> String {
+        let _ = self.ended.recv_timeout(LATE);
+        let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sites;
+
+    fn here(more: &str) -> Way {
+        let text = format!("[site.here]\nkind = 'local'\n{more}");
+        let sites = sites::parse("s", &text, None).unwrap();
+        Way::to(&sites.0[0], Path::new("/nowhere"))
+    }
+
+    #[test]
+    fn a_script_says_what_it_prints_after_the_mark() {
+        let way = here("setup = 'echo Welcome; greeting=hello'");
+        let said = way
+            .run("a test", "echo $greeting; cat; echo oh >&2; exit 3", LIMIT)
+            .unwrap();
+        assert_eq!(said.code, Some(3));
+        assert_eq!(said.stdout, "hello\n");
+        assert_eq!(said.stderr, "oh\n");
+    }
+
+    #[test]
+    fn a_setup_that_ends_the_shell_is_named() {
+        let error = here("setup = 'exit 4'")
+            .run("a test", "echo x", LIMIT)
+            .unwrap_err();
+        assert!(error.to_string().contains("`setup`"), "{error}");
+    }
+
+    #[test]
+    fn time_is_limited_and_nobody_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let pid = folder.path().join("pid");
+        let script = format!("sleep 1000 & echo $! >{}; wait", pid.display());
+        let error = here("")
+            .run("sleeping", &script, Span::from_millis(500))
+            .unwrap_err();
+        assert!(matches!(error, ClusterError::TimedOut { .. }), "{error}");
+        assert!(error.may_pass());
+        let pid = std::fs::read_to_string(pid).unwrap();
+        let stat = format!("/proc/{}/stat", pid.trim());
+        while std::fs::read_to_string(&stat).is_ok_and(|stat| !stat.contains(") Z ")) {
+            thread::yield_now();
+        }
+    }
+
+    #[test]
+    fn output_is_limited() {
+        let error = here("").run("talking", "yes", LIMIT).unwrap_err();
+        assert!(error.to_string().contains("is longer than"), "{error}");
+    }
+
+    #[test]
+    fn a_file_arrives_whole_or_not_at_all() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a b/it's");
+        let there = path.to_str().unwrap();
+        here("").put(&b"hello"[..], 5, there, 0o600, LIMIT).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"hello");
+        here("")
+            .put(&b"he"[..], 5, there, 0o600, LIMIT)
+            .unwrap_err();
+        assert_eq!(std::fs::read(&path).unwrap(), b"hello");
+        assert_eq!(
+            std::fs::read_dir(path.parent().unwrap()).unwrap().count(),
+            1
+        );
+    }
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let error = here("")
+            .ask("asking", "no-such-queue", "no-such-queue -v")
+            .unwrap_err();
+        assert!(
+            matches!(&error, ClusterError::Missing { program, .. } if program == "no-such-queue"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn what_ssh_says_is_told_apart() {
+        let said = |stderr: &str| not_there("x", stderr);
+        assert!(matches!(
+            said("Host key verification failed.\r\n"),
+            ClusterError::HostKey { .. }
+        ));
+        assert!(matches!(
+            said("a@b: Permission denied (publickey)."),
+            ClusterError::Login { .. }
+        ));
+        let away = said("ssh: connect to host b port 22: Connection refused");
+        assert!(matches!(away, ClusterError::Unreachable { .. }) && away.may_pass());
+    }
+}

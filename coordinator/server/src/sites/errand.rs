@@ -1,0 +1,280 @@
+//! The thread of one site: asks the loop what is wanted and the queue what is there, and does what the pilot says.
+
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use cluster::camp::Camp;
+use cluster::pilot::{self, Action, Pilot, Settings, Standing, Wanted};
+use cluster::{Array, ClusterError, Limits, Mode, survey};
+use model::{Epoch, Revision, Span, Timestamp};
+use sched::Offer;
+use tokio::sync::{mpsc, oneshot};
+
+use super::Board;
+use super::pass::Pass;
+use crate::input::{Input, Query};
+
+/// The least time between two looks at the queue, however often there may be something new.
+const LOOK_LEAST: Duration = Duration::from_secs(1);
+
+/// The longest pause after a site could not be reached several times in a row.
+const PAUSE_LONGEST: Duration = Duration::from_secs(300);
+
+/// How long the token may take to arrive.
+const TOKEN_LIMIT: Span = Span::from_secs(60);
+
+/// What the thread of a site works with.
+pub(crate) struct Errand {
+    pub(crate) camp: Camp,
+    /// Where its workers dial.
+    pub(crate) coordinator: String,
+    /// What its workers join by.
+    pub(crate) pass: Pass,
+    pub(crate) revision: Revision,
+    pub(crate) epoch: Epoch,
+    pub(crate) inputs: mpsc::Sender<Input>,
+    pub(crate) board: Board,
+    pub(crate) woken: Receiver<()>,
+}
+
+/// A site that was looked at.
+struct Known {
+    pilot: Pilot,
+    limits: Limits,
+    /// Whether the queue was seen to hold nothing of ours.
+    is_empty: bool,
+    /// Whether the program was seen to be the right one.
+    is_ready: bool,
+}
+
+/// The loop has ended.
+struct Stopping;
+
+impl Errand {
+    /// Runs until the loop has ended.
+    pub(crate) fn run(self) {
+        let origin = Instant::now();
+        let poll = Duration::from_micros(self.camp.site.poll.0);
+        let mut known: Option<Known> = None;
+        let mut failures = 0_u32;
+        loop {
+            let begun = Instant::now();
+            let Ok(wanted) = self.wanted() else { return };
+            let now = Timestamp(u64::try_from(origin.elapsed().as_micros()).unwrap_or(u64::MAX));
+            let pause = match self.round(now, &mut known, wanted) {
+                Ok(()) => {
+                    failures = 0;
+                    poll
+                }
+                Err(error) => {
+                    let words = words(&error);
+                    tracing::warn!(site = self.camp.site.name, "{words}");
+                    self.board
+                        .change(&self.camp.site.name, |site| site.trouble = words);
+                    let longer = poll.saturating_mul(1 << failures.min(8));
+                    failures = failures.saturating_add(1);
+                    longer.min(PAUSE_LONGEST).max(poll)
+                }
+            };
+            match self.woken.recv_timeout(pause) {
+                Err(RecvTimeoutError::Disconnected) => return,
+                Err(RecvTimeoutError::Timeout) => {}
+                Ok(()) => thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
+            }
+        }
+    }
+
+    /// What the farm wants of this site.
+    fn wanted(&self) -> Result<Wanted, Stopping> {
+        let site = &self.camp.site;
+        let offer = Offer {
+            revision: self.revision,
+            threads: site.threads,
+            // A job that asks for memory is served where the site says how much there is.
+            memory_bytes: site.memory_bytes.unwrap_or(0),
+            labels: site.labels.iter().cloned().chain([site.label()]).collect(),
+            time_left: None,
+        };
+        let (reply, answer) = oneshot::channel();
+        let query = Query::Wanted(offer, site.label(), reply);
+        let asked = self.inputs.blocking_send(Input::Ask(query));
+        asked.map_err(|_| Stopping)?;
+        match answer.blocking_recv() {
+            Ok(Ok(wanted)) => Ok(wanted),
+            _ => Err(Stopping),
+        }
+    }
+
+    fn round(
+        &self,
+        now: Timestamp,
+        known: &mut Option<Known>,
+        wanted: Wanted,
+    ) -> Result<(), ClusterError> {
+        let known = match known {
+            Some(known) => known,
+            None => match self.look()? {
+                Some(found) => known.insert(found),
+                None => return Ok(()),
+            },
+        };
+        // Nobody is asked about nothing.
+        if wanted.squares == 0 && known.is_empty {
+            self.show(known.pilot.standing());
+            return Ok(());
+        }
+        self.fly(now, known, wanted)
+    }
+
+    /// Looks at a site for the first time; `None` where its workers cannot dial.
+    fn look(&self) -> Result<Option<Known>, ClusterError> {
+        let site = &self.camp.site;
+        let dials = match site.mode {
+            Mode::Auto => survey::host(site, &self.camp.way, Some(&self.coordinator))?.dials,
+            Mode::Pilot | Mode::Poll => None,
+        };
+        let mode = survey::fitting(site, dials);
+        self.board.change(&site.name, |status| {
+            status.mode = mode.name().to_owned();
+            if mode == Mode::Poll {
+                status.trouble = "poll mode is not there yet, so that nothing is submitted; where its workers can dial this \
+                                  coordinator, write mode = \"pilot\""
+                    .to_owned();
+            }
+        });
+        if mode == Mode::Poll {
+            return Ok(None);
+        }
+        let limits = self.camp.queue.limits()?;
+        let names = format!("{}{}-", self.camp.prefix(), self.epoch.0);
+        let settings = Settings::of(site, &limits, names);
+        Ok(Some(Known {
+            pilot: Pilot::new(settings),
+            limits,
+            is_empty: false,
+            is_ready: false,
+        }))
+    }
+
+    fn fly(&self, now: Timestamp, known: &mut Known, wanted: Wanted) -> Result<(), ClusterError> {
+        let (queue, site) = (&self.camp.queue, &self.camp.site.name);
+        let shown = queue.list(&self.camp.prefix())?;
+        known.is_empty = !shown.iter().any(|task| task.state.is_live());
+        for action in known.pilot.observe(now, &shown, wanted) {
+            match action {
+                Action::LookUp(arrays) => {
+                    let kept = queue.ended(&arrays)?;
+                    known.pilot.have_ended(now, &arrays, &kept);
+                }
+                Action::Delete(tasks) => {
+                    let count = tasks.len();
+                    tracing::info!(site, count, "allocations that nobody needs are deleted");
+                    queue.delete(&tasks)?;
+                }
+                Action::Submit { name, tasks } => {
+                    known.is_empty = false;
+                    self.submit(now, known, &name, tasks);
+                }
+            }
+        }
+        if let Some((array, task)) = known.pilot.take_failed() {
+            // What was there may be there no more.
+            known.is_ready = false;
+            let said = self.camp.said(&array, task).unwrap_or_default();
+            known.pilot.has_said(&said);
+            tracing::warn!(site, array, task, said, "an allocation failed");
+        }
+        self.show(known.pilot.standing());
+        let asked = unix_ms();
+        self.board.change(site, |site| site.asked_unix_ms = asked);
+        Ok(())
+    }
+
+    fn submit(&self, now: Timestamp, known: &mut Known, name: &str, tasks: u32) {
+        let submitted = self.make_ready(known).and_then(|()| {
+            let array = self.array(&known.limits, name, tasks);
+            self.camp.queue.submit(&array)
+        });
+        let site = &self.camp.site.name;
+        match submitted {
+            Ok(array) => {
+                tracing::info!(site, %array, name, tasks, "allocations are submitted");
+                known.pilot.submitted(&array, tasks);
+            }
+            Err(error) => {
+                let words = words(&error);
+                tracing::warn!(site, name, tasks, "{words}");
+                known.is_ready = false;
+                known.pilot.refused(now, words);
+            }
+        }
+    }
+
+    fn array(&self, limits: &Limits, name: &str, tasks: u32) -> Array {
+        // One that asks for no time is given the queue's.
+        let time_limit = match (self.camp.site.time_limit, limits.time) {
+            (Some(ours), Some(most)) => Some(ours.min(most)),
+            (Some(ours), None) => Some(ours),
+            (None, _) => limits.time_usual,
+        };
+        Array {
+            script: pilot::script(&self.camp, self.pass.dials(&self.coordinator), time_limit),
+            log: self.camp.log(name),
+            name: name.to_owned(),
+            tasks,
+            running_max: None,
+            time_limit,
+        }
+    }
+
+    /// Sees once that the program there makes the same pixels, and brings the token: each time, since it may be another.
+    fn make_ready(&self, known: &mut Known) -> Result<(), ClusterError> {
+        let (site, way) = (&self.camp.site, &self.camp.way);
+        if !known.is_ready {
+            let program = survey::program(site, way)?;
+            if program.revision != self.revision.0 {
+                return Err(ClusterError::Program {
+                    path: site.program.clone(),
+                    site: site.name.clone(),
+                    what: format!(
+                        "it makes pixels of renderer revision {}, and this farm those of {}",
+                        program.revision, self.revision.0
+                    ),
+                });
+            }
+            known.is_ready = true;
+        }
+        let token = self.pass.content()?;
+        let way = &self.camp.way;
+        let path = pilot::token_file(&self.camp);
+        let bytes = token.len() as u64;
+        way.put(token.as_bytes(), bytes, &path, 0o600, TOKEN_LIMIT)?;
+        self.camp.trim_logs()
+    }
+
+    fn show(&self, standing: &Standing) {
+        self.board.change(&self.camp.site.name, |site| {
+            site.waiting = standing.waiting;
+            site.running = standing.running;
+            site.wanted = standing.wanted;
+            site.trouble = standing.trouble.clone().unwrap_or_default();
+        });
+    }
+}
+
+/// An error with its causes, and what to change.
+fn words(error: &ClusterError) -> String {
+    let mut words = error.to_string();
+    let mut source = std::error::Error::source(error);
+    while let Some(cause) = source {
+        words = format!("{words}: {cause}");
+        source = cause.source();
+    }
+    format!("{words}; {}", error.next())
+}
+
+fn unix_ms() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    u64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(u64::MAX)
+}

@@ -1,0 +1,42 @@
+#!/bin/sh
+# Runs tasks of an array on a host without a queue, one after the other; as many of these run as tasks may run at a time.
+# In its folder: `count` tasks, `script` for each, and what becomes of them. It needs /proc, which tells a process
+# from another that later has the same number.
+#   runner.sh FOLDER LOG    (LOG with % in the place of a task's number)
+cd "$1" || exit 1
+log=$2
+
+# Writes the number and start time of process $2 into file $1, whole or not at all.
+note() {
+    start=$(sed 's/^.*) //' "/proc/$2/stat" | cut -d' ' -f20)
+    echo "$2 $start" >"$1.new" && mv "$1.new" "$1"
+}
+
+# A signal is for the task that runs: this one stays to write down how it ended.
+trap : HUP INT TERM
+note "$$.runner" "$$"
+read -r count <count
+task=0
+while [ "$task" -lt "$count" ]; do
+    task=$((task + 1))
+    # Whoever makes the folder has the task.
+    mkdir "$task.claim" 2>/dev/null || continue
+    FLYBY_TASK=$task
+    export FLYBY_TASK
+    out=$(printf '%s' "$log" | sed "s|%|$task|")
+    # A session of its own, so that all of it can be ended, and nothing else.
+    setsid sh ./script </dev/null >>"$out" 2>&1 &
+    child=$!
+    note "$task.pid" "$child" 2>/dev/null
+    # Whoever deleted it before it had a number could not end it.
+    [ -e "$task.deleted" ] && kill -s TERM -- "-$child" 2>/dev/null
+    code=
+    while [ -z "$code" ]; do
+        wait "$child"
+        code=$?
+        # A signal ends the waiting, and not the task.
+        [ "$code" -gt 128 ] && kill -0 "$child" 2>/dev/null && code=
+    done
+    echo "$code" >"$task.exit.new" && mv "$task.exit.new" "$task.exit"
+done
+rm -f "$$.runner"
