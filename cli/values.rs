@@ -1,7 +1,7 @@
 //! How users write sizes, rectangles and numbers on the command line.
 
 use model::rect::SIDE_MAX;
-use model::{Rect, Resolution};
+use model::{Rect, Resolution, Span};
 
 pub(crate) use model::words::{label, memory, span};
 
