@@ -40,6 +40,17 @@ impl Sched {
         if job.state(index) == ImageState::Waiting {
             job.begin(index);
         }
+        let worker = &self.workers[place];
+        if let Some(queue) = worker.offer.queue {
+            let (id, window) = (worker.id, self.jobs[&image.job].spec.window);
+            let grid = self.grid_for(queue, window);
+            if let Some((job, index)) = self.job_and_place(image) {
+                job.cut_for_queue(index, (id, grid));
+            }
+        }
+        let Some((job, index)) = self.job_and_place(image) else {
+            return false;
+        };
         if !job
             .work
             .get(&index)
@@ -94,7 +105,8 @@ impl Sched {
             && !job.is_over()
             && job.after.is_empty()
             && worker.kinds.contains(job.kind)
-            && worker.live.len() < self.config.limits.credit_max as usize
+            && (worker.offer.queue.is_some()
+                || worker.live.len() < self.config.limits.credit_max as usize)
     }
 
     /// Calls back what was leased meanwhile of these pixels and is not begun.

@@ -24,6 +24,7 @@ impl Sched {
         if let Ok(index) = worker.live.binary_search(&number) {
             worker.live.remove(index);
         }
+        worker.lets_go(attempt.image);
         worker.idle -= u32::from(attempt.phase != Phase::Running);
         worker.backlog = worker.backlog.saturating_sub(attempt.cost);
         worker.moved = self.now;

@@ -160,7 +160,13 @@ impl Sched {
             let costs = worker.live.iter().map(|number| self.attempts[*number].cost);
             assert_eq!(costs.sum::<u64>(), worker.backlog);
             assert_eq!(worker.kinds, self.kinds.served_by(&worker.offer));
-            assert_eq!(worker.waiting.due().is_some(), worker.is_idle());
+            let is_queue = worker.offer.queue.is_some();
+            assert_eq!(self.queues.contains(&place), is_queue);
+            let may_be_late = worker.is_idle() && !is_queue;
+            assert_eq!(worker.waiting.due().is_some(), may_be_late);
+            let tiles: u32 = worker.images.values().sum();
+            let counted = if is_queue { worker.live.len() } else { 0 };
+            assert_eq!(tiles as usize, counted);
             assert_eq!(worker.seat, worker.wants(place));
             assert_eq!(worker.counted, worker.counts());
             capacity += worker.counted.as_ref().map_or(0, |counts| counts.capacity);

@@ -228,7 +228,13 @@ impl Job {
     /// The next tile for a worker, as (place of its image, tile): in the region of interest first, then
     /// in order; an image is begun where none in flight has one.
     pub(crate) fn take_tile(&mut self, ask: &Ask, config: &Config) -> Option<(u32, u32)> {
-        let take = |(&place, work): (&u32, &mut Work)| Some((place, work.take(ask)?));
+        let take = |(&place, work): (&u32, &mut Work)| {
+            let tile = work.take(ask)?;
+            if ask.queue.is_some() {
+                work.is_for(ask.worker);
+            }
+            Some((place, tile))
+        };
         let mut focused = self.work.iter_mut().filter(|(_, work)| work.has_focused());
         if let Some(found) = focused.find_map(take) {
             return Some(found);
@@ -238,16 +244,36 @@ impl Job {
         }
         let place = self.waiting.first();
         let place = place.filter(|_| self.may_begin_for(ask, config))?;
-        let tile = self.begin(place).take(ask)?;
-        Some((place, tile))
+        let work = match ask.queue {
+            None => self.begin(place),
+            Some(queue) => {
+                let work = self.begin_cut(place, queue.grid);
+                work.is_for(ask.worker);
+                work
+            }
+        };
+        Some((place, work.take(ask)?))
     }
 
     /// Begins an image that waits.
     pub(crate) fn begin(&mut self, place: u32) -> &mut Work {
+        self.begin_cut(place, self.shape.grid)
+    }
+
+    fn begin_cut(&mut self, place: u32, grid: TileGrid) -> &mut Work {
         self.set_state(place, ImageState::Rendering);
-        let map = self.costs.map(self.shape.grid).map(Arc::new);
-        let work = Work::new(self.shape.grid, map, self.focus);
+        let map = self.costs.map(grid).map(Arc::new);
+        let work = Work::new(grid, map, self.focus);
         self.work.entry(place).or_insert(work)
+    }
+
+    /// Cuts an image in flight for a queue, if nobody holds a tile of it.
+    pub(crate) fn cut_for_queue(&mut self, place: u32, (queue, grid): (WorkerId, TileGrid)) {
+        let map = self.costs.map(grid).map(Arc::new);
+        if let Some(work) = self.work.get_mut(&place) {
+            work.cut_anew(grid, map);
+            work.is_for(queue);
+        }
     }
 
     pub(crate) fn may_begin(&self, config: &Config) -> bool {
@@ -262,7 +288,8 @@ impl Job {
             let is_short = cell.is_some_and(|cost| cost > fits.cost);
             !is_short && !self.work.values().any(Work::has_open)
         };
-        self.may_begin(config) && ask.fits.is_none_or(fits)
+        let has_room = ask.queue.is_none_or(|queue| queue.has_room);
+        has_room && self.may_begin(config) && ask.fits.is_none_or(fits)
     }
 
     /// What all that waits for a worker is expected to cost, if anything was measured.

@@ -7,10 +7,11 @@ use model::{AttemptId, ImageRef, JobId, Lease, Rect, Span, Timestamp};
 use crate::attempt::{Attempt, Start};
 use crate::job::Job;
 use crate::market::Stage;
-use crate::needs::{Kind, KindSet};
+use crate::needs::{Kind, KindSet, Queue};
 use crate::pace::{cost_of, time_of};
 use crate::roster::Place;
-use crate::work::{Amount, Ask};
+use crate::tiling::{TileGrid, TileRule};
+use crate::work::{Amount, Ask, OfQueue};
 use crate::worker::Worker;
 use crate::{Effect, Sched};
 
@@ -85,9 +86,10 @@ impl Sched {
     /// How large a tile of a job a worker should have, if there is one for it.
     pub(crate) fn may_take(&self, worker: Place, job: JobId) -> Option<Ask> {
         let (worker, job) = (&self.workers[worker], &self.jobs[&job]);
-        let ask = match worker.aside.job(job.id) {
-            None => self.ask(worker, job),
-            Some(_) => None,
+        let ask = match (worker.aside.job(job.id), worker.offer.queue) {
+            (None, None) => self.ask(worker, job),
+            (None, Some(queue)) => Some(self.ask_of_queue(worker, queue, job)),
+            (Some(_), _) => None,
         };
         ask.filter(|ask| job.has_for(ask, &self.config))
     }
@@ -121,7 +123,48 @@ impl Sched {
             most,
             fits,
             lasts: left.map(|left| cost_of(left + self.config.tile_time, speed)),
+            queue: None,
         })
+    }
+
+    /// What a worker that stands for a queue should have of a job: every tile of an image is a cell.
+    fn ask_of_queue(&self, worker: &Worker, queue: Queue, job: &Job) -> Ask {
+        let able = self.able_for(job);
+        let queues = self.queues.iter().filter(|&&place| {
+            let counts = self.workers[place].counted.as_ref();
+            counts.is_some_and(|counts| {
+                counts.kinds.contains(job.kind) && !counts.aside.contains(&job.id)
+            })
+        });
+        Ask {
+            worker: worker.id,
+            able,
+            most: None,
+            fits: None,
+            lasts: None,
+            queue: Some(OfQueue {
+                grid: self.grid_for(queue, job.spec.window),
+                has_room: worker.has_room(),
+                is_last: queues.count() >= able as usize,
+            }),
+        }
+    }
+
+    /// How an image is cut for a queue.
+    pub(crate) fn grid_for(&self, queue: Queue, window: Rect) -> TileGrid {
+        let cut = |max_array_size: u64| {
+            let rule = TileRule {
+                min_tile_pixels: queue.min_tile_pixels,
+                max_array_size: max_array_size.clamp(1, self.config.max_array_size),
+            };
+            TileGrid::new(window, rule.tile_size(window))
+        };
+        let grid = cut(queue.max_array_size);
+        // So few tiles that one of them is larger than tiles may be are more than an array.
+        match grid.tile(0).area() > self.config.limits.tile_pixels_max {
+            true => cut(window.area().div_ceil(self.config.limits.tile_pixels_max) * 4),
+            false => grid,
+        }
     }
 
     /// Workers that take tiles of a job.
@@ -264,6 +307,7 @@ impl Sched {
             worker.moved = self.now;
         }
         worker.live.push(attempt);
+        worker.takes(image);
         worker.idle += 1;
         worker.backlog = worker.backlog.saturating_add(cost.unwrap_or(0));
         worker.patience = limit;

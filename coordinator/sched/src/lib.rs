@@ -64,7 +64,7 @@ pub use config::{Config, IMAGES_IN_FLIGHT_LEAST, Limits, TailGain};
 pub use demand::Demand;
 pub use effect::{Effect, JobOutcome, RevokeReason};
 pub use event::{BlockRef, Event, LinkId, Submission, TileShape};
-pub use needs::{Needs, Offer};
+pub use needs::{Needs, Offer, Queue};
 pub use refusal::{BlockRefusal, CommandRefusal, SubmitRefusal, Verdict, WorkerRefusal};
 pub use sched::Sched;
 pub use view::{

@@ -45,6 +45,7 @@ impl Sched {
         worker.kinds = self.kinds.served_by(&offer);
         worker.ends = offer.time_left.map(|left| self.now + left);
         worker.offer = offer;
+        self.stands_for_queue(place);
         self.heard(id);
         self.stays_expelled(place);
         if known.is_some() {
@@ -72,6 +73,21 @@ impl Sched {
             image,
         }));
         self.worker_changed(place);
+    }
+
+    /// Notes whether a worker stands for a queue, and the images of which it holds tiles.
+    fn stands_for_queue(&mut self, place: Place) {
+        let worker = &mut self.workers[place];
+        worker.images.clear();
+        match worker.offer.queue {
+            None => drop(self.queues.remove(&place)),
+            Some(_) => {
+                for number in worker.live.clone() {
+                    worker.takes(self.attempts[number].image);
+                }
+                self.queues.insert(place);
+            }
+        }
     }
 
     fn admit_worker(&self, id: WorkerId, offer: &Offer) -> Result<(), WorkerRefusal> {
@@ -158,7 +174,11 @@ impl Sched {
         attempt.phase = after;
         attempt.limit = limit;
         attempt.started.get_or_insert(self.now);
-        let due = (after == Phase::Running).then(|| self.now + limit);
+        let lag = self.workers[place]
+            .offer
+            .queue
+            .map_or(Span(0), |queue| queue.lag);
+        let due = (after == Phase::Running).then(|| self.now + limit + lag);
         self.timers
             .set(Timer::Stuck(number), &mut attempt.stuck, due);
         let worker = &mut self.workers[place];
@@ -305,6 +325,7 @@ impl Sched {
         let Some(mut worker) = self.workers.remove(place) else {
             return;
         };
+        self.queues.remove(&place);
         self.timers.remove(Timer::Lost(place), &mut worker.lost);
         self.timers
             .remove(Timer::Waiting(place), &mut worker.waiting);
@@ -333,7 +354,9 @@ impl Sched {
     /// for its patience again. While it renders, the limit of that holds.
     pub(crate) fn rearm_waiting(&mut self, place: Place) {
         let worker = &mut self.workers[place];
-        let due = worker.is_idle().then(|| self.now + worker.patience);
+        // What waits in a queue waits for others, however long.
+        let waits_here = worker.is_idle() && worker.offer.queue.is_none();
+        let due = waits_here.then(|| self.now + worker.patience);
         self.timers
             .set(Timer::Waiting(place), &mut worker.waiting, due);
     }

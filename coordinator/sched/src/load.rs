@@ -89,6 +89,7 @@ impl Load {
                     memory_bytes: 0,
                     labels: BTreeSet::new(),
                     time_left: None,
+                    queue: None,
                 },
                 held: Vec::new(),
                 begun: Vec::new(),

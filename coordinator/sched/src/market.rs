@@ -37,6 +37,8 @@ pub(crate) struct Group {
     pub(crate) aside: Vec<JobId>,
     /// Whether their time is limited.
     pub(crate) is_limited: bool,
+    /// Who stands for a queue is like nobody else.
+    pub(crate) queue: Option<Place>,
 }
 
 /// Where a worker stands among those of its group that want tiles.

@@ -33,6 +33,20 @@ pub struct Offer {
     pub labels: BTreeSet<String>,
     /// How long it may still run, by its queue's or its user's word; absent where nobody set a limit.
     pub time_left: Option<Span>,
+    /// How it takes tiles where it stands for a cluster's queue.
+    pub queue: Option<Queue>,
+}
+
+/// How a worker takes tiles that stands for a cluster's queue: whole images, each an array of tiles by the rule
+/// of thesis §C.3.2. Its credit counts images: one in hand and those ahead (§C.3.5).
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub struct Queue {
+    /// Fewest pixels of a tile, the thesis's Min_tsize.
+    pub min_tile_pixels: u64,
+    /// Most tiles of an image.
+    pub max_array_size: u64,
+    /// By how much what is heard of its tiles may be late: it is polled (§C.3.4).
+    pub lag: Span,
 }
 
 impl Needs {

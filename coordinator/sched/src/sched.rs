@@ -11,7 +11,7 @@ use crate::job::Job;
 use crate::live::Live;
 use crate::market::Market;
 use crate::needs::Kinds;
-use crate::roster::Roster;
+use crate::roster::{Place, Roster};
 use crate::timers::Timers;
 use crate::wrong::Wrong;
 use crate::{
@@ -39,6 +39,8 @@ pub struct Sched {
     pub(crate) waited_for: BTreeMap<JobId, BTreeSet<JobId>>,
     pub(crate) kinds: Kinds,
     pub(crate) workers: Roster,
+    /// Those that stand for a queue.
+    pub(crate) queues: BTreeSet<Place>,
     /// What all threads of workers that take tiles get done in a microsecond, times 1,024.
     pub(crate) capacity: u64,
     /// Live attempts by number.
@@ -74,6 +76,7 @@ impl Sched {
             waited_for: BTreeMap::new(),
             kinds: Kinds::default(),
             workers: Roster::default(),
+            queues: BTreeSet::new(),
             capacity: 0,
             attempts: Live::default(),
             attempts_made: 0,

@@ -53,6 +53,7 @@ impl Sched {
             let seats = seats.iter().take_while(|seat| seat.has_free_thread());
             idle.extend(
                 seats
+                    .filter(|seat| self.workers[seat.worker].offer.queue.is_none())
                     .map(|seat| (kinds, seat.worker))
                     .take(WORKERS_LOOKED_AT),
             );

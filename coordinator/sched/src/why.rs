@@ -328,7 +328,7 @@ impl Sched {
             WhyWorker::Aside { until }
         } else if worker.credit == 0 {
             WhyWorker::WantsNone
-        } else if worker.live.len() >= worker.credit as usize {
+        } else if !worker.has_room() {
             let attempts = u32::try_from(worker.live.len()).unwrap_or(u32::MAX);
             WhyWorker::Full { attempts }
         } else if waits().next().is_none() {

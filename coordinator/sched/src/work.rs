@@ -35,6 +35,8 @@ pub(crate) struct Work {
     /// No more of it is leased: it is about to fail, or to be rendered again.
     pub(crate) given_up: bool,
     grid: TileGrid,
+    /// The queue that it was cut for.
+    queue: Option<WorkerId>,
     map: Option<Arc<CostMap>>,
     focus: Option<Rect>,
     /// The tile of each cell.
@@ -95,6 +97,19 @@ pub(crate) struct Ask {
     pub(crate) fits: Option<Amount>,
     /// What costs more than this, others had better begin: here it would be done after all else.
     pub(crate) lasts: Option<u64>,
+    /// Where it is asked for a queue.
+    pub(crate) queue: Option<OfQueue>,
+}
+
+/// What a queue may have: whole images.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OfQueue {
+    /// How an image is cut for it.
+    pub(crate) grid: TileGrid,
+    /// Whether it may have another image.
+    pub(crate) has_room: bool,
+    /// Whether nobody else is there for what others have begun.
+    pub(crate) is_last: bool,
 }
 
 impl Work {
@@ -106,6 +121,7 @@ impl Work {
             spent: 0,
             given_up: false,
             grid,
+            queue: None,
             map,
             focus,
             cells: vec![NO_TILE; count],
@@ -155,6 +171,7 @@ impl Work {
     /// Whether one waits for this worker.
     pub(crate) fn has_for(&self, ask: &Ask) -> bool {
         !self.given_up
+            && self.suits(ask)
             && (self.shared_for(ask).is_some()
                 || self.troubled_for(ask).is_some()
                 || self.piece_for(ask).is_some()
@@ -163,7 +180,7 @@ impl Work {
 
     /// The tile of which this worker is to make an attempt.
     pub(crate) fn take(&mut self, ask: &Ask) -> Option<u32> {
-        while !self.given_up {
+        while !self.given_up && self.suits(ask) {
             if let Some(tile) = self.shared_for(ask) {
                 self.shared.remove(&tile);
                 return Some(tile);
@@ -196,6 +213,31 @@ impl Work {
             }
         }
         None
+    }
+
+    /// Whether whoever asks may have of it: a queue has what was cut for it, and the rest where nobody else is there.
+    fn suits(&self, ask: &Ask) -> bool {
+        ask.queue
+            .is_none_or(|queue| self.queue == Some(ask.worker) || (queue.has_room && queue.is_last))
+    }
+
+    /// Has it taken by a queue.
+    pub(crate) fn is_for(&mut self, queue: WorkerId) {
+        self.queue = Some(queue);
+    }
+
+    /// Cuts it anew, where nobody holds a tile of it.
+    pub(crate) fn cut_anew(&mut self, grid: TileGrid, map: Option<Arc<CostMap>>) {
+        if self.grid != grid && self.tiles.is_empty() {
+            let pixels = core::mem::replace(&mut self.pixels, PixelsDone::none(grid.window()));
+            let (spent, makers) = (self.spent, core::mem::take(&mut self.makers));
+            *self = Self {
+                pixels,
+                spent,
+                makers,
+                ..Self::new(grid, map, self.focus)
+            };
+        }
     }
 
     /// Whether these pixels are a tile's that could have been cut, and not all durable.
@@ -284,6 +326,9 @@ impl Work {
 
     /// What this worker may render once more.
     fn check_for(&self, ask: &Ask) -> Option<usize> {
+        if ask.queue.is_some() {
+            return None;
+        }
         self.checks.iter().position(|waiting| {
             waiting.check.suits(ask.worker) && self.part_of_check(waiting, ask).is_some()
         })

@@ -1,8 +1,9 @@
 //! A worker, as the scheduler knows it.
 
+use alloc::collections::BTreeMap;
 use alloc::vec::Vec;
 
-use model::{JobId, Span, Timestamp, WorkerId};
+use model::{ImageRef, JobId, Span, Timestamp, WorkerId};
 
 use crate::aside::Aside;
 use crate::market::{Group, Seat};
@@ -24,6 +25,8 @@ pub(crate) struct Worker {
     pub(crate) credit: u32,
     /// Its live attempts, in the order in which they were leased.
     pub(crate) live: Vec<u64>,
+    /// Where it stands for a queue: the images of which it holds tiles, and how many of each.
+    pub(crate) images: BTreeMap<ImageRef, u32>,
     /// How many of them wait for something else of its: those not started, those being delivered.
     pub(crate) idle: u32,
     /// What its live attempts cost together.
@@ -73,6 +76,7 @@ impl Worker {
             link: Link::Open,
             credit: 0,
             live: Vec::new(),
+            images: BTreeMap::new(),
             idle: 0,
             backlog: 0,
             moved: now,
@@ -111,9 +115,35 @@ impl Worker {
         })
     }
 
+    /// Whether it may hold another tile, or where it stands for a queue another image.
+    pub(crate) fn has_room(&self) -> bool {
+        let held = match self.offer.queue {
+            None => self.live.len(),
+            Some(_) => self.images.len(),
+        };
+        held < self.credit as usize
+    }
+
+    /// Notes that it got a tile of an image.
+    pub(crate) fn takes(&mut self, image: ImageRef) {
+        if self.offer.queue.is_some() {
+            *self.images.entry(image).or_default() += 1;
+        }
+    }
+
+    /// Notes that it holds a tile of an image no more.
+    pub(crate) fn lets_go(&mut self, image: ImageRef) {
+        if let Some(tiles) = self.images.get_mut(&image) {
+            *tiles -= 1;
+            if *tiles == 0 {
+                self.images.remove(&image);
+            }
+        }
+    }
+
     /// Where it belongs in the market.
     pub(crate) fn wants(&self, place: Place) -> Option<(Group, Seat)> {
-        let wants = self.is_able() && self.live.len() < self.credit as usize;
+        let wants = self.is_able() && (self.has_room() || !self.images.is_empty());
         wants.then(|| {
             let seat = Seat::new(
                 self.ends,
@@ -125,6 +155,7 @@ impl Worker {
                 kinds: self.kinds,
                 aside: self.aside.jobs(),
                 is_limited: self.ends.is_some(),
+                queue: self.offer.queue.map(|_| place),
             };
             (group, seat)
         })

@@ -149,6 +149,7 @@ fn joins_for(farm: &mut Farm, id: u64, time_left: Option<Span>) {
         link: LinkId(100 + id),
         offer: Offer {
             time_left,
+            queue: None,
             ..offer()
         },
         held: vec![],

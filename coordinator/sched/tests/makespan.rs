@@ -289,6 +289,7 @@ fn makespan(
                 memory_bytes: 0,
                 labels: BTreeSet::new(),
                 time_left: None,
+                queue: None,
             },
             held: Vec::new(),
             begun: Vec::new(),

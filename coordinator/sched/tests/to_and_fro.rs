@@ -139,6 +139,7 @@ impl World {
             offer: Offer {
                 threads,
                 time_left,
+                queue: None,
                 ..offer()
             },
             held: vec![],

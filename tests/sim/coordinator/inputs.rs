@@ -25,6 +25,7 @@ impl Coordinator {
                     memory_bytes: 0,
                     labels: BTreeSet::new(),
                     time_left: None,
+                    queue: None,
                 },
                 held,
                 begun,

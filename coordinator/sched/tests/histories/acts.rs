@@ -176,6 +176,7 @@ impl History {
                 memory_bytes: u64::from(id >= 1),
                 labels: (id != 1).then(|| "fast".to_owned()).into_iter().collect(),
                 time_left: (id == 1).then_some(Span::from_secs(40)),
+                queue: None,
             },
             held,
             begun,

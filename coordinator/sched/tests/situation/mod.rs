@@ -290,6 +290,7 @@ pub(crate) fn offer() -> Offer {
         memory_bytes: 0,
         labels: BTreeSet::new(),
         time_left: None,
+        queue: None,
     }
 }
 

@@ -110,6 +110,7 @@ impl Shell {
                 memory_bytes: about.memory_bytes,
                 labels: about.labels.clone(),
                 time_left: about.time_left,
+                queue: None,
             },
             held,
             begun,
