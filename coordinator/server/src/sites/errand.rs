@@ -95,6 +95,7 @@ impl Errand {
             memory_bytes: site.memory_bytes.unwrap_or(0),
             labels: site.labels.iter().cloned().chain([site.label()]).collect(),
             time_left: None,
+            queue: None,
         };
         let (reply, answer) = oneshot::channel();
         let query = Query::Wanted(offer, site.label(), reply);
