@@ -18,6 +18,7 @@ mod cancel;
 mod chaos;
 mod commands;
 mod demo;
+mod deploy;
 mod doctor;
 mod failures;
 mod full_disk;
