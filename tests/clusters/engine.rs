@@ -72,7 +72,7 @@ impl Engine {
         self.started.push(kind);
         let output = self.script(&format!("{kind}-up.sh"), words, settings);
         if output.status.code() == Some(CANNOT) {
-            need::skip(
+            need::leave_out(
                 kind,
                 &String::from_utf8_lossy(&output.stderr)
                     .trim()

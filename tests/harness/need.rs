@@ -68,7 +68,7 @@ pub(crate) fn address() -> Option<IpAddr> {
     };
     let found = own();
     if found.is_none() {
-        skip(
+        leave_out(
             "other machines",
             "this machine has no address but loopback, so that nothing speaks TLS",
         );
@@ -76,13 +76,23 @@ pub(crate) fn address() -> Option<IpAddr> {
     found
 }
 
-/// Says that a test is skipped, since this machine lacks what it needs; the test must return.
+/// Says that a test is skipped, since this machine lacks what it needs; the test must return. In CI that is a failure.
 pub(crate) fn skip(name: &str, why: &str) {
     assert!(
         std::env::var("CI").as_deref() != Ok("true"),
         "in CI nothing may be skipped, but: {name}: {why}"
     );
-    eprintln!("skipped: {name}: {why}");
+    note("skipped", name, why);
+}
+
+/// Says that a test is left out, since machines of this kind cannot run it, whatever is installed; the test must return.
+pub(crate) fn leave_out(name: &str, why: &str) {
+    note("left out", name, why);
+}
+
+fn note(what: &str, name: &str, why: &str) {
+    let line = format!("{what}: {name}: {why}\n");
+    eprint!("{line}");
     if let Some(list) = std::env::var_os("FLYBY_TESTS_SKIPPED") {
         let mut list = OpenOptions::new()
             .create(true)
@@ -90,7 +100,6 @@ pub(crate) fn skip(name: &str, why: &str) {
             .open(list)
             .unwrap();
         // One write, so that tests that skip at the same time do not mix their lines.
-        list.write_all(format!("{name}: {why}\n").as_bytes())
-            .unwrap();
+        list.write_all(line.as_bytes()).unwrap();
     }
 }
