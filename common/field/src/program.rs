@@ -16,13 +16,11 @@ mod bound_tests;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use fearless_simd::dispatch;
-
 use crate::interval::Interval;
 use crate::lanes::Lanes;
 use crate::modulus::Modulus;
 use crate::points::{BATCH, Points, Scratch};
-use crate::simd::SimdLevel;
+use crate::simd::{SimdLevel, dispatch};
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
 pub(crate) use ahead::Ahead;
@@ -31,6 +29,7 @@ pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
 use code::{Code, Operation};
+use machine::Count;
 pub(crate) use machine::Machine;
 use plan::Plan;
 pub(crate) use slopes::Slopes;
@@ -111,7 +110,7 @@ impl Program {
         machine.prepare(&self.code);
         let mut start = 0;
         while start < n {
-            let count = dispatch!(level.token(), simd => machine.run(simd, &self.code, points, start, noise_evaluations));
+            let count = dispatch!(level, simd => machine.run(simd, &self.code, points, start, noise_evaluations));
             let end = start + count.points;
             for (out, root) in out.iter_mut().zip(&self.code.roots) {
                 numbers(&mut out[start..end], machine.register(*root), f64::INFINITY);
@@ -150,7 +149,7 @@ impl Program {
         let [gx, gy, gz] = gradient;
         let mut start = 0;
         while start < n {
-            let count = dispatch!(level.token(), simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
+            let count = dispatch!(level, simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
             let duals = slopes.register(root);
             let end = start + count.points;
             let [x, y, z] = &duals.gradient;
@@ -192,14 +191,29 @@ impl Program {
         along.keep_noises(false);
         let mut start = 0;
         while start < n {
-            along.aim(direction, start);
-            let count = dispatch!(level.token(), simd => along.run(simd, &self.code, points, start, noise_evaluations));
+            let count = self.run_along(level, points, direction, start, along, noise_evaluations);
             let duals = along.register(root);
             let end = start + count.points;
             numbers(&mut value[start..end], &duals.value, f64::INFINITY);
             numbers(&mut slope[start..end], &duals.gradient[0], 0.0);
             start = end;
         }
+    }
+
+    /// Values and derivatives along directions of the points from `start` on. Both evaluations with such derivatives
+    /// call it, so that its loops are compiled once per SIMD level.
+    #[inline(never)]
+    fn run_along(
+        &self,
+        level: SimdLevel,
+        points: &Points<'_>,
+        direction: [&[f64]; 3],
+        start: usize,
+        along: &mut Slopes<1>,
+        noises: &mut u64,
+    ) -> Count {
+        along.aim(direction, start);
+        dispatch!(level, simd => along.run(simd, &self.code, points, start, noises))
     }
 
     /// Whether [`Program::evaluate_ahead`] can bound the first root.
@@ -255,18 +269,15 @@ impl Program {
         } = scratch;
         along.prepare(&self.code);
         along.keep_noises(true);
-        along.aim(direction, 0);
         stretches.prepare(&self.code);
-        dispatch!(level.token(), simd => {
-            along.run(simd, &self.code, points, 0, noise_evaluations);
-            match walk::blobs(&self.code) {
-                Some(blobs) if self.walks => {
-                    ahead.copy_from_slice(outlook.most);
-                    behind.fill(0.0);
-                    walk::run(simd, blobs, along, root, outlook, ahead);
-                }
-                _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
+        self.run_along(level, points, direction, 0, along, noise_evaluations);
+        dispatch!(level, simd => match walk::blobs(&self.code) {
+            Some(blobs) if self.walks => {
+                ahead.copy_from_slice(outlook.most);
+                behind.fill(0.0);
+                walk::run(simd, blobs, along, root, outlook, ahead);
             }
+            _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
         });
         let duals = along.register(root);
         numbers(value, &duals.value, f64::INFINITY);
