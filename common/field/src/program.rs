@@ -3,6 +3,7 @@
 mod ahead;
 mod bends;
 mod bounds;
+mod boxes;
 mod code;
 mod fold;
 mod machine;
@@ -20,6 +21,7 @@ use crate::interval::Interval;
 use crate::lanes::Lanes;
 use crate::modulus::Modulus;
 use crate::points::{BATCH, Points, Scratch};
+use crate::range::Reduced;
 use crate::simd::{SimdLevel, dispatch};
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
@@ -28,6 +30,8 @@ pub use ahead::{Outlook, Sides};
 pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
+pub use boxes::Boxes;
+pub(crate) use boxes::OverBoxes;
 use code::{Code, Operation};
 use machine::Count;
 pub(crate) use machine::Machine;
@@ -282,6 +286,36 @@ impl Program {
         let duals = along.register(root);
         numbers(value, &duals.value, f64::INFINITY);
         numbers(slope, &duals.gradient[0], 0.0);
+    }
+
+    /// The first root over boxes, as [`Program::over_cell`] gives it over one: many at a time and not quite as narrow.
+    ///
+    /// Fields with shapes, grids or gradients of noises are asked cell by cell.
+    ///
+    /// # Panics
+    /// If the slices differ in length, or the program has no root.
+    pub fn over_boxes(
+        &self,
+        level: SimdLevel,
+        boxes: &Boxes<'_>,
+        scratch: &mut Scratch,
+        out: &mut [Reduced<3>],
+    ) {
+        assert!(boxes.len() == out.len(), "there is a result for every box");
+        if !boxes::bounds(&self.code) {
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = self.over_cell(&boxes.cell(i));
+            }
+            return;
+        }
+        let root = *self.code.roots.first().expect("there is a root");
+        let machine = &mut scratch.boxes;
+        machine.prepare(&self.code);
+        let mut start = 0;
+        while start < out.len() {
+            start +=
+                dispatch!(level, simd => machine.run(simd, &self.code, boxes, start, root, out));
+        }
     }
 
     /// The values that each root can take, rounding included; may be infinite.
