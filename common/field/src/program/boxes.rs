@@ -70,7 +70,6 @@ impl Boxes<'_> {
 
 /// The registers of linear functions.
 #[derive(Debug)]
-#[expect(clippy::vec_box, reason = "results take their places by pointer")]
 pub(crate) struct OverBoxes {
     registers: Vec<Box<Linears>>,
     constants: Vec<f64>,

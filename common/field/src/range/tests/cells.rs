@@ -105,7 +105,7 @@ impl Many {
     fn new(count: u32, axes: [[f64; 3]; 3]) -> Self {
         let each = |f: &dyn Fn(u32) -> f64| (0..count).map(f).collect::<Vec<_>>();
         let least = |i: u32| {
-            if i % 3 == 0 {
+            if i.is_multiple_of(3) {
                 0.0
             } else {
                 0.02 * unit(hash(&[i, 71]))
