@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use model::Resolution;
 
 use crate::bench::threads::{BUDGET, Measured, SCENES, Threads, rays, render};
 use crate::error::{Ending, Error};
@@ -28,6 +29,21 @@ pub(crate) struct Options {
     #[arg(long, value_name = "N", default_value_t = 5,
           value_parser = clap::value_parser!(u32).range(1..=1_000))]
     runs: u32,
+
+    /// Pixels of every scene, as `render` takes them: for scenes that would take less than a second.
+    #[arg(long, value_name = "WxH", value_parser = crate::values::resolution)]
+    resolution: Option<Resolution>,
+}
+
+impl Options {
+    /// What `render` is told of the resolution.
+    fn size(&self) -> impl Iterator<Item = String> {
+        let size = self
+            .resolution
+            .map(|size| format!("{}x{}", size.width, size.height));
+        size.into_iter()
+            .flat_map(|size| ["--resolution".to_owned(), size])
+    }
 }
 
 /// What is rendered.
@@ -94,6 +110,7 @@ fn chosen(options: &Options, folder: &Path) -> Result<Vec<Chosen>, Error> {
                     .map_err(|error| Error::failed("cannot make a folder").because(error))?;
                 let file = ours.write(&place)?;
                 let mut settings = vec!["--rays".to_owned(), "1".to_owned()];
+                settings.extend(options.size());
                 for set in ours.set {
                     settings.extend(["--set".to_owned(), (*set).to_owned()]);
                 }
@@ -119,7 +136,7 @@ fn chosen(options: &Options, folder: &Path) -> Result<Vec<Chosen>, Error> {
             Ok(Chosen {
                 name: stem(&name),
                 file: file.clone(),
-                settings: Vec::new(),
+                settings: options.size().collect(),
             })
         })
         .collect()

@@ -30,4 +30,4 @@ pub use gradient::{BEND, RANGE, ROUNDING, SLOPE, noise, noise_gradient};
 pub(crate) use gradient::{
     Lattice, corners, gradient_of, mean_gradient, node_hash, split, value, value_along, value_bend,
 };
-pub(crate) use kind::Noise;
+pub(crate) use kind::{Limits, Noise};

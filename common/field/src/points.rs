@@ -1,6 +1,6 @@
 //! Where a program is evaluated, and the memory it is evaluated in.
 
-use crate::program::{Ahead, Machine, Slopes};
+use crate::program::{Ahead, Machine, OverBoxes, Slopes};
 
 /// Points of one chunk of work: longer batches are cut into pieces of this length.
 pub const BATCH: usize = 128;
@@ -51,6 +51,7 @@ pub struct Scratch {
     pub(crate) slopes: Slopes<3>,
     pub(crate) along: Slopes<1>,
     pub(crate) stretches: Ahead,
+    pub(crate) boxes: OverBoxes,
 }
 
 impl Scratch {

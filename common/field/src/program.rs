@@ -3,6 +3,7 @@
 mod ahead;
 mod bends;
 mod bounds;
+mod boxes;
 mod code;
 mod fold;
 mod machine;
@@ -16,13 +17,12 @@ mod bound_tests;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use fearless_simd::dispatch;
-
 use crate::interval::Interval;
 use crate::lanes::Lanes;
 use crate::modulus::Modulus;
 use crate::points::{BATCH, Points, Scratch};
-use crate::simd::SimdLevel;
+use crate::range::Reduced;
+use crate::simd::{SimdLevel, dispatch};
 use crate::surroundings::Surroundings;
 use crate::{Graph, NodeId};
 pub(crate) use ahead::Ahead;
@@ -30,7 +30,10 @@ pub use ahead::{Outlook, Sides};
 pub use bends::Taylor;
 pub(crate) use bounds::Change;
 use bounds::Pass;
+pub use boxes::Boxes;
+pub(crate) use boxes::OverBoxes;
 use code::{Code, Operation};
+use machine::Count;
 pub(crate) use machine::Machine;
 use plan::Plan;
 pub(crate) use slopes::Slopes;
@@ -111,7 +114,7 @@ impl Program {
         machine.prepare(&self.code);
         let mut start = 0;
         while start < n {
-            let count = dispatch!(level.token(), simd => machine.run(simd, &self.code, points, start, noise_evaluations));
+            let count = dispatch!(level, simd => machine.run(simd, &self.code, points, start, noise_evaluations));
             let end = start + count.points;
             for (out, root) in out.iter_mut().zip(&self.code.roots) {
                 numbers(&mut out[start..end], machine.register(*root), f64::INFINITY);
@@ -150,7 +153,7 @@ impl Program {
         let [gx, gy, gz] = gradient;
         let mut start = 0;
         while start < n {
-            let count = dispatch!(level.token(), simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
+            let count = dispatch!(level, simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
             let duals = slopes.register(root);
             let end = start + count.points;
             let [x, y, z] = &duals.gradient;
@@ -192,14 +195,29 @@ impl Program {
         along.keep_noises(false);
         let mut start = 0;
         while start < n {
-            along.aim(direction, start);
-            let count = dispatch!(level.token(), simd => along.run(simd, &self.code, points, start, noise_evaluations));
+            let count = self.run_along(level, points, direction, start, along, noise_evaluations);
             let duals = along.register(root);
             let end = start + count.points;
             numbers(&mut value[start..end], &duals.value, f64::INFINITY);
             numbers(&mut slope[start..end], &duals.gradient[0], 0.0);
             start = end;
         }
+    }
+
+    /// Values and derivatives along directions of the points from `start` on. Both evaluations with such derivatives
+    /// call it, so that its loops are compiled once per SIMD level.
+    #[inline(never)]
+    fn run_along(
+        &self,
+        level: SimdLevel,
+        points: &Points<'_>,
+        direction: [&[f64]; 3],
+        start: usize,
+        along: &mut Slopes<1>,
+        noises: &mut u64,
+    ) -> Count {
+        along.aim(direction, start);
+        dispatch!(level, simd => along.run(simd, &self.code, points, start, noises))
     }
 
     /// Whether [`Program::evaluate_ahead`] can bound the first root.
@@ -255,22 +273,49 @@ impl Program {
         } = scratch;
         along.prepare(&self.code);
         along.keep_noises(true);
-        along.aim(direction, 0);
         stretches.prepare(&self.code);
-        dispatch!(level.token(), simd => {
-            along.run(simd, &self.code, points, 0, noise_evaluations);
-            match walk::blobs(&self.code) {
-                Some(blobs) if self.walks => {
-                    ahead.copy_from_slice(outlook.most);
-                    behind.fill(0.0);
-                    walk::run(simd, blobs, along, root, outlook, ahead);
-                }
-                _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
+        self.run_along(level, points, direction, 0, along, noise_evaluations);
+        dispatch!(level, simd => match walk::blobs(&self.code) {
+            Some(blobs) if self.walks => {
+                ahead.copy_from_slice(outlook.most);
+                behind.fill(0.0);
+                walk::run(simd, blobs, along, root, outlook, ahead);
             }
+            _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
         });
         let duals = along.register(root);
         numbers(value, &duals.value, f64::INFINITY);
         numbers(slope, &duals.gradient[0], 0.0);
+    }
+
+    /// The first root over boxes, as [`Program::over_cell`] gives it over one: many at a time and not quite as narrow.
+    ///
+    /// Fields with shapes, grids or gradients of noises are asked cell by cell.
+    ///
+    /// # Panics
+    /// If the slices differ in length, or the program has no root.
+    pub fn over_boxes(
+        &self,
+        level: SimdLevel,
+        boxes: &Boxes<'_>,
+        scratch: &mut Scratch,
+        out: &mut [Reduced<3>],
+    ) {
+        assert!(boxes.len() == out.len(), "there is a result for every box");
+        if !boxes::bounds(&self.code) {
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = self.over_cell(&boxes.cell(i));
+            }
+            return;
+        }
+        let root = *self.code.roots.first().expect("there is a root");
+        let machine = &mut scratch.boxes;
+        machine.prepare(&self.code);
+        let mut start = 0;
+        while start < out.len() {
+            start +=
+                dispatch!(level, simd => machine.run(simd, &self.code, boxes, start, root, out));
+        }
     }
 
     /// The values that each root can take, rounding included; may be infinite.

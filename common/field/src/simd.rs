@@ -3,7 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
-use fearless_simd::{Level, Simd, dispatch};
+use fearless_simd::Level;
 
 /// An instruction set that this machine has.
 ///
@@ -56,8 +56,6 @@ impl SimdLevel {
     pub fn name(self) -> &'static str {
         match self.token {
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
-            Level::Sse2(_) => "sse2",
-            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             Level::Sse4_2(_) => "sse4.2",
             #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
             Level::Avx2(_) => "avx2",
@@ -74,13 +72,44 @@ impl SimdLevel {
     /// Everything that the kernel calls in its loops must be inlined into it.
     #[inline(always)]
     pub fn vectorize<R>(self, kernel: impl FnOnce() -> R) -> R {
-        dispatch!(self.token, simd => simd.vectorize(kernel))
+        dispatch!(self, simd => fearless_simd::Simd::vectorize(simd, kernel))
     }
 
     pub(crate) fn token(self) -> Level {
         self.token
     }
 }
+
+/// Runs an expression with the token of a level, compiled once for each.
+///
+/// Levels that the library knows and we do not count as scalar: a build for x86_64 uses SSE2 there anyway,
+/// and every level more costs a fifth of this crate's compile time.
+macro_rules! dispatch {
+    ($level:expr, $simd:ident => $run:expr) => {{
+        macro_rules! with {
+            ($token:expr) => {{
+                let $simd = $token;
+                fearless_simd::Simd::vectorize(
+                    $simd,
+                    #[inline(always)]
+                    || $run,
+                )
+            }};
+        }
+        match $level.token() {
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            fearless_simd::Level::Sse4_2(token) => with!(token),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            fearless_simd::Level::Avx2(token) => with!(token),
+            #[cfg(any(target_arch = "x86", target_arch = "x86_64"))]
+            fearless_simd::Level::Avx512(token) => with!(token),
+            #[cfg(target_arch = "aarch64")]
+            fearless_simd::Level::Neon(token) => with!(token),
+            _ => with!(fearless_simd::Fallback::new()),
+        }
+    }};
+}
+pub(crate) use dispatch;
 
 impl Default for SimdLevel {
     fn default() -> Self {

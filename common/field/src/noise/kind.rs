@@ -238,6 +238,44 @@ impl Noise {
     }
 }
 
+/// What is known of a noise everywhere: for loops that know as much of every noise.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Limits {
+    /// All values are within `range` of it.
+    pub(crate) middle: f64,
+    pub(crate) range: f64,
+    /// Of [`Noise::slope`], [`Noise::bend`], [`Noise::rounding`] and [`Noise::slope_rounding`].
+    pub(crate) slope: f64,
+    pub(crate) bend: f64,
+    pub(crate) rounding: f64,
+    pub(crate) slope_rounding: f64,
+}
+
+impl Limits {
+    /// Of gradient noise by its own loops.
+    pub(crate) const GRADIENT: Self = Self {
+        middle: 0.0,
+        range: gradient::RANGE,
+        slope: gradient::SLOPE,
+        bend: gradient::BEND,
+        rounding: gradient::ROUNDING,
+        slope_rounding: 16.0 * gradient::ROUNDING,
+    };
+
+    /// Of any noise.
+    pub(crate) fn of(noise: &Noise) -> Self {
+        let Interval { low, high } = noise.range();
+        Self {
+            middle: 0.5 * (low + high),
+            range: 0.5 * (high - low),
+            slope: noise.slope(),
+            bend: noise.bend(),
+            rounding: noise.rounding(),
+            slope_rounding: noise.slope_rounding(),
+        }
+    }
+}
+
 #[expect(
     clippy::cast_possible_truncation,
     reason = "the noise computes with f32"

@@ -19,13 +19,15 @@ mod stretch;
 use fearless_simd::Simd;
 
 use crate::arithmetic::{Binary, Unary};
+use crate::noise::Limits;
 use crate::number::Number;
 use crate::program::code::{Code, FOOTPRINT, Instruction, Operation, TIME};
 use crate::program::machine;
 use crate::program::slopes::Slopes;
 use lanes::{Here, Stretches, WIDTH, row};
 use octaves::{Growth, Octaves};
-use stretch::{Stretch, least, most};
+pub(crate) use stretch::Stretch;
+use stretch::{least, most};
 
 /// What is known of the field and wanted of the rays, lane by lane.
 #[derive(Clone, Copy, Debug)]
@@ -92,11 +94,12 @@ pub(crate) fn bounds(code: &Code) -> bool {
     code.instructions
         .iter()
         .all(|instruction| match &instruction.act {
-            Operation::AnyNoise(_)
-            | Operation::Slope(..)
-            | Operation::Shape(_)
-            | Operation::Grid(_) => false,
-            Operation::Cascade(cascade) => cascade.octaves.iter().all(|o| o.noise.is_none()),
+            Operation::Slope(..) | Operation::Shape(_) | Operation::Grid(_) => false,
+            Operation::AnyNoise(noise) => noise.bend().is_finite(),
+            Operation::Cascade(cascade) => {
+                let noises = cascade.octaves.iter().filter_map(|o| o.noise.as_ref());
+                noises.into_iter().all(|noise| noise.bend().is_finite())
+            }
             _ => true,
         })
 }
@@ -219,13 +222,12 @@ impl Ahead {
                 #[inline(always)]
                 |a| a.smoothstep(*low, *high),
             ),
-            Operation::Curve(curve) => each(a, out, |a| {
-                let over = crate::interval::Interval::new(a.low, a.high);
-                let (range, slope) = (curve.range(over), curve.slope_max(over));
-                let size = slope * a.steepness();
-                Stretch::new((range.low, range.high), (-size, size))
-            }),
-            Operation::Noise(_) => {
+            Operation::Curve(curve) => each(a, out, |a| a.curve(curve)),
+            Operation::Noise(_) | Operation::AnyNoise(_) => {
+                let limits = match &instruction.act {
+                    Operation::AnyNoise(noise) => Limits::of(noise),
+                    _ => Limits::GRADIENT,
+                };
                 let octaves = &mut *self.octaves;
                 let from = along.tape.sample_at(place.sample);
                 place.sample += 1;
@@ -233,7 +235,7 @@ impl Ahead {
                     #[inline(always)]
                     || {
                         octaves.argument([a, b, c]);
-                        octaves.noise(from, place.start, 1.0);
+                        octaves.noise(limits, from, place.start, 1.0);
                     },
                 );
                 out.copy(&octaves.noise);
@@ -247,10 +249,9 @@ impl Ahead {
                 octaves.run(simd, cascade, [a, b, c], growth, &along.tape, place);
                 out.copy(&octaves.total);
             }
-            Operation::AnyNoise(_)
-            | Operation::Slope(..)
-            | Operation::Shape(_)
-            | Operation::Grid(_) => unreachable!("their stretches are not bounded"),
+            Operation::Slope(..) | Operation::Shape(_) | Operation::Grid(_) => {
+                unreachable!("their stretches are not bounded")
+            }
         }
     }
 }

@@ -14,7 +14,7 @@ use crate::points::{BATCH, Points};
 use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
 
 /// Lanes are computed in multiples of this, so that vector loops have no scalar rest.
-const STEP: usize = 16;
+pub(crate) const STEP: usize = 16;
 
 /// The registers of values.
 #[derive(Debug)]

@@ -348,6 +348,43 @@ mod tests {
     }
 
     #[test]
+    fn bodies_stay_that_come_into_a_cell_while_it_is_looked_at() {
+        // One ball stands; another goes away from there, 6 m in a second.
+        let mut graph = Graph::new();
+        let mut push = |op, args: &[NodeId], params: &[f64]| graph.push(op, args, params).unwrap();
+        let p = push(Op::Position, &[], &[]);
+        let [zero, six] = [0.0, 6.0].map(|number| push(Op::Constant, &[], &[number]));
+        let time = push(Op::Time, &[], &[]);
+        let away = push(Op::Mul, &[time, six], &[]);
+        let mut ball = |x, radius| {
+            let centre = push(Op::Vector, &[x, zero, zero], &[]);
+            let from = push(Op::VectorSub, &[p, centre], &[]);
+            let length = push(Op::Length, &[from], &[]);
+            let radius = push(Op::Constant, &[], &[radius]);
+            push(Op::Sub, &[length, radius], &[])
+        };
+        let (stands, goes) = (ball(zero, 1.0), ball(away, 1.25));
+        let both = graph.push(Op::Min, &[stands, goes], &[]).unwrap();
+        let whole = Program::compile(&graph, &[both], Interval::new(0.0, 1.0)).unwrap();
+        let during = |low: f64, high: f64| {
+            let mut cell = box_around([0.0; 3], 1.2);
+            cell.time = Interval::new(low, high);
+            whole.simplified(&[cell])
+        };
+        let few = during(0.8, 1.0).unwrap();
+        assert!(!few.moves() && during(0.0, 1.0).is_none());
+        for i in 0..1000 {
+            let unit = |word: u32| hash::unit(hash::hash(&[i, word]));
+            let place = Place {
+                at: [0, 1, 2].map(|axis| 2.4 * unit(axis) - 1.2),
+                footprint: 0.0,
+                time: 0.8 + 0.2 * unit(3),
+            };
+            assert!(agree(&few, &whole, &place), "{place:?}");
+        }
+    }
+
+    #[test]
     fn what_matters_in_any_cell_stays() {
         let whole = bodies(JOINS[0]);
         let both = [[-3.0, 0.0, 0.0], [3.0, 0.0, 1.2]].map(|centre| box_around(centre, 0.5));

@@ -198,9 +198,11 @@ impl<const N: usize> Slopes<N> {
                 let Octaves {
                     cells,
                     full: gradient,
+                    along,
                     ..
                 } = &mut *self.octaves;
-                let Sample { noise, .. } = self.tape.sample();
+                let sample = self.tape.sample();
+                let noise = &mut sample.noise;
                 lanes::split(simd, n, [&a.value, &b.value, &c.value], cells);
                 match &instruction.act {
                     Operation::Slope(any, axis) => {
@@ -211,11 +213,16 @@ impl<const N: usize> Slopes<N> {
                     }
                     _ => unreachable!("the arm takes no other"),
                 }
-                let [gx, gy, gz] = gradient;
+                let [gx, gy, gz] = &*gradient;
                 for i in 0..n {
                     let slopes = [f64::from(gx[i]), f64::from(gy[i]), f64::from(gz[i])];
                     let at = [a.at(i), b.at(i), c.at(i)];
                     out.set(i, pull(slopes, at, f64::from(noise[i])));
+                }
+                // For whoever goes through the code again.
+                if N == 1 && self.tape.keeps {
+                    directions(n, &IDENTITY, [a, b, c], along);
+                    self.tape.last().take(n, gradient, along);
                 }
                 return count.points as u64;
             }

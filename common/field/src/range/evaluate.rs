@@ -11,7 +11,7 @@ use crate::range::function::Function;
 use crate::range::{Affine, Arithmetic, Jet, Reduced, Slope};
 
 /// Twice the error of [`cascade::log2`] in octaves of two, with room for a lacunarity near one.
-const DEPTH_ROUNDING: f64 = 1e-7;
+pub(crate) const DEPTH_ROUNDING: f64 = 1e-7;
 
 /// A place of a field: where, when, and how large a pixel is there.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -45,8 +45,8 @@ pub struct Cell {
     at: [Reduced<3>; 3],
     /// The footprints in it, metres.
     pub footprint: Interval,
-    /// Seconds from image 0.
-    pub time: f64,
+    /// The instants, seconds from image 0.
+    pub time: Interval,
 }
 
 impl Cell {
@@ -57,7 +57,7 @@ impl Cell {
         Self {
             at,
             footprint: Interval::point(0.0),
-            time: 0.0,
+            time: Interval::point(0.0),
         }
     }
 
@@ -76,7 +76,7 @@ impl Cell {
         Self {
             at,
             footprint: Interval::point(0.0),
-            time: 0.0,
+            time: Interval::point(0.0),
         }
     }
 }
@@ -86,7 +86,7 @@ impl Cell {
         Ground {
             at: self.at,
             footprint: self.footprint,
-            time: Reduced::constant(self.time),
+            time: Reduced::any(self.time),
         }
     }
 }

@@ -38,7 +38,9 @@ mod slope;
 mod tests;
 
 pub use affine::Affine;
+pub(crate) use evaluate::DEPTH_ROUNDING;
 pub use evaluate::{Cell, Place, Segment};
+pub(crate) use form::{ROUNDING, TINY};
 pub use jet::Jet;
 pub use reduced::Reduced;
 pub use slope::Slope;

@@ -67,7 +67,7 @@ impl<const N: usize> Reduced<N> {
     }
 
     /// Itself, or nothing known where an overflow left no number.
-    fn checked(self) -> Self {
+    pub(crate) fn checked(self) -> Self {
         let sound = self.centre.is_finite() && self.radius().is_finite();
         if sound { self } else { Self::UNKNOWN }
     }

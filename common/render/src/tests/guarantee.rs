@@ -11,7 +11,7 @@ use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
 use crate::trace::bundle::Span;
-use crate::trace::ground::{Ground, Site};
+use crate::trace::ground::{Bounds, Ground, Site};
 use crate::trace::means::{self, Means};
 use crate::trace::methods::tests::reference::truth;
 use crate::trace::methods::tests::surfaces::surfaces;
@@ -379,19 +379,26 @@ fn packets_of_any_size_and_order_meet_what_their_rays_meet_alone() {
 
 #[test]
 fn where_the_ground_is_clear_the_field_is_positive() {
-    let mut scene = scenes::ridges();
+    ground_is_clear(scenes::ridges(), 0.1, [0.2, 0.4, 0.5]);
+    ground_is_clear(scenes::planet(), 2.0, [0.2, 0.4, 0.5]);
+}
+
+/// Rays over grounds made for few rays and for many, and what share of their ways to the surface they must at least be led.
+fn ground_is_clear(mut scene: scene::Description, nearest: f64, least: [f64; 3]) {
     scene.film.resolution.width = 400;
     let view = View::new(&scene.camera, &scene.film, 0.0);
     let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
     let mut scratch = Scratch::new();
-    for (rays, least) in [(1.0, 0.2), (1e4, 0.4), (1e7, 0.5)] {
+    for (rays, least) in [1.0, 1e4, 1e7].into_iter().zip(least) {
         let ground = Ground::new(&Site {
             field: &surface.program,
+            level: surface.level,
+            time: Interval::new(view.instants().0, view.instants().1),
             bound: &surface.bound,
             footprint: surface.footprint,
             eye: view.eye(),
             travel: view.travel(),
-            nearest: 0.1,
+            nearest,
             rays,
         })
         .unwrap();
@@ -406,12 +413,20 @@ fn where_the_ground_is_clear_the_field_is_positive() {
             let Some((clear, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
                 continue;
             };
-            let mut spans = [Span { ray: 0, clear, end }];
+            let mut spans = [Span {
+                ray: 0,
+                clear,
+                end,
+                steps: 0.0,
+            }];
             let never = AtomicBool::new(false);
             let rays = std::slice::from_ref(&ray);
-            ground
-                .lead(&surface.program, rays, &mut spans, &never)
-                .unwrap();
+            let bounds = Bounds {
+                field: &surface.program,
+                level: surface.level,
+                scratch: &mut scratch,
+            };
+            ground.lead(bounds, rays, &mut spans, &never).unwrap();
             let far = spans[0].clear;
             assert!((clear..=end).contains(&far));
             let distances: Vec<f64> = (0..=500)

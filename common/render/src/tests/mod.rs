@@ -4,5 +4,6 @@ mod analytic;
 mod golden;
 mod grids;
 mod guarantee;
+mod led;
 mod same;
 mod scenes;

@@ -161,7 +161,8 @@ fn no_technique_of_the_tracer_changes_a_pixel() {
             is_of_use |= more.evaluations > counts.evaluations
                 || more.noise_evaluations > counts.noise_evaluations;
         }
-        // Of no scene here: their shutters are as short as their images are small, whose rays look far between points.
+        // Of no scene here: their shutters are as short as their images are small, whose rays look far between points; what
+        // looks gain is counted in `led`.
         let is_left_out = matches!(
             technique,
             Technique::Slices | Technique::Hindsight | Technique::Bends

@@ -39,6 +39,8 @@ pub(crate) struct Span {
     pub(crate) clear: f64,
     /// Nor beyond.
     pub(crate) end: f64,
+    /// Evaluations along the ray so far.
+    pub(crate) steps: f64,
 }
 
 /// Memory in which bundles are followed.

@@ -44,10 +44,19 @@ pub(crate) struct Search {
 struct Lane {
     ray: usize,
     steps: Steps,
+    /// After so many evaluations it pauses.
+    pause: f64,
+}
+
+/// When rays pause in their search, to be led on by what costs less, and those that did.
+pub(crate) struct Pause<'a> {
+    /// After so many evaluations of a round.
+    pub(crate) after: f64,
+    pub(crate) spans: &'a mut Vec<Span>,
 }
 
 impl Search {
-    /// Searches along every span. Rays that find a point inside go to `found`, which gets the memory
+    /// Searches along every span until the ray is done or pauses. Rays that find a point inside go to `found`, which gets the memory
     /// of evaluations and the counts with them; for those that need no more, `hits` has the answer.
     pub(crate) fn run(
         &mut self,
@@ -58,6 +67,7 @@ impl Search {
             cancel,
         }: Wanted<'_>,
         spans: &[Span],
+        pause: Pause<'_>,
         Results {
             scratch,
             counts,
@@ -76,7 +86,7 @@ impl Search {
                 let Some(span) = waiting.next() else {
                     break;
                 };
-                self.start(rays, span);
+                self.start(rays, span, pause.after);
             }
             let n = self.rays.len();
             if n == 0 {
@@ -94,6 +104,17 @@ impl Search {
                 let is_found = rows.clear[i] >= rows.inside[i];
                 let is_exhausted = rows.count[i] > surface.steps_max;
                 if !is_found && !is_exhausted && rows.clear[i] <= rows.end[i] {
+                    let lane = &self.rays[i];
+                    // Whoever knows a point inside is about to find the first.
+                    if rows.count[i] >= lane.pause && rows.inside[i] == f64::INFINITY {
+                        pause.spans.push(Span {
+                            ray: lane.ray,
+                            clear: rows.clear[i],
+                            end: rows.end[i],
+                            steps: rows.count[i],
+                        });
+                        self.remove(i);
+                    }
                     continue;
                 }
                 #[expect(
@@ -129,7 +150,7 @@ impl Search {
         }
     }
 
-    fn start(&mut self, rays: &[Ray], span: &Span) {
+    fn start(&mut self, rays: &[Ray], span: &Span, pause: f64) {
         let ray = &rays[span.ray];
         let steps = ray.grid.steps();
         let (clear, end) = (steps.from(span.clear), steps.from(span.end));
@@ -147,13 +168,14 @@ impl Search {
         rows.inside_value[lane] = 0.0;
         rows.outside[lane] = f64::NEG_INFINITY;
         rows.outside_value[lane] = 0.0;
-        rows.count[lane] = 0.0;
+        rows.count[lane] = span.steps;
         rows.seen[lane] = 0.0;
         rows.bend[lane] = 0.0;
         rows.steps.set(lane, steps);
         self.rays.push(Lane {
             ray: span.ray,
             steps,
+            pause: span.steps + pause,
         });
     }
 

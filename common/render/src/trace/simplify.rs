@@ -30,8 +30,7 @@ const ROOM: f64 = 1e-9;
 /// Whether there may be something to leave out.
 pub(crate) fn has_choices(surface: &Surface) -> bool {
     let is_used = Technique::Choices.is_used(surface.without);
-    // The instants of moving fields are not in the cells.
-    is_used && !surface.moves && surface.program.has_choices()
+    is_used && surface.program.has_choices()
 }
 
 /// The surface with less of a program, if some of it does not matter to any of these rays.
@@ -60,7 +59,7 @@ fn cells(surface: &Surface, rays: &[Ray]) -> Option<Vec<Cell>> {
     let up = middle.cross(across);
     let mut origin = [Span::NONE; 3];
     let (mut u, mut v, mut s) = (Span::NONE, Span::NONE, Span::NONE);
-    let mut eye = Span::NONE;
+    let (mut eye, mut time) = (Span::NONE, Span::NONE);
     let mut forward_least = 1.0;
     for ray in rays {
         let Some((clear, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
@@ -71,6 +70,7 @@ fn cells(surface: &Surface, rays: &[Ray]) -> Option<Vec<Cell>> {
         let gap = |t: f64| surface.footprint.at(from_eye + t);
         let (clear, end) = (clear - gap(clear), end + gap(end));
         eye.add(from_eye);
+        time.add(ray.time);
         let forward = ray.direction.dot(middle);
         if forward < 0.5 {
             return None;
@@ -117,6 +117,7 @@ fn cells(surface: &Surface, rays: &[Ray]) -> Option<Vec<Cell>> {
             surface.footprint.at(nearest) * (1.0 - ROOM),
             surface.footprint.at(eye.high + t_high) * (1.0 + ROOM),
         );
+        cell.time = Interval::new(time.low, time.high);
         cells.push(cell);
         if near <= s.low {
             break;

@@ -125,6 +125,8 @@ impl Surface {
         let rays = f64::from(description.sampling.rays);
         let site = Site {
             field: &program,
+            level,
+            time,
             bound: &surface.bound,
             footprint,
             eye: view.eye(),
@@ -132,7 +134,7 @@ impl Surface {
             nearest,
             rays: width * height * rays * rays,
         };
-        let has_ground = rest.is_some() && !program.moves() && Technique::Ground.is_used(without);
+        let has_ground = rest.is_some() && Technique::Ground.is_used(without);
         let ground = Some(site).filter(|_| has_ground);
         let ground = ground.and_then(|site| Ground::new(&site)).map(Arc::new);
         let clearances = Arc::new(Clearances::new(&around, nearest));

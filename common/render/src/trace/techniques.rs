@@ -27,6 +27,8 @@ pub enum Technique {
     Choices,
     /// Rays are led over cells of the ground that were proven clear up to a height.
     Ground,
+    /// Rays that search for long, and those towards the sun, go back to these cells.
+    Rounds,
     /// Samples are followed along a Morton curve.
     Curve,
     /// Samples are followed by slices of the shutter.
@@ -35,7 +37,7 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Bundles,
         Self::Tangents,
         Self::Stretches,
@@ -47,6 +49,7 @@ impl Technique {
         Self::Distances,
         Self::Choices,
         Self::Ground,
+        Self::Rounds,
         Self::Curve,
         Self::Slices,
     ];
@@ -65,6 +68,7 @@ impl Technique {
             Self::Distances => "tables by distance",
             Self::Choices => "simplified programs",
             Self::Ground => "clear ground",
+            Self::Rounds => "rounds over the ground",
             Self::Curve => "Morton curve",
             Self::Slices => "shutter slices",
         }

@@ -8,10 +8,11 @@ use glam::DVec3;
 use super::bound;
 use super::bundle::{Bundles, Span};
 use super::grid::Grid;
+use super::ground;
 use super::means::Means;
 use super::polish::{Found, Polish};
 use super::ranges::Ranges;
-use super::search::Search;
+use super::search::{Pause, Search};
 use super::simplify;
 use super::surface::Surface;
 use super::techniques::Technique;
@@ -21,6 +22,9 @@ use crate::times::{Part, Stopwatch};
 
 /// Rays that are traced together: between them it is looked whether to go on.
 const TOGETHER: usize = 4096;
+
+/// Evaluations after which a ray goes back to the cells of the ground; each round is twice as long as the one before.
+const ROUND: f64 = 6.0;
 
 /// A ray to be traced.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -89,6 +93,7 @@ pub(crate) struct Results<'a> {
 #[derive(Default)]
 pub(crate) struct Tracer {
     spans: Vec<Span>,
+    paused: Vec<Span>,
     bundles: Bundles,
     search: Search,
     ranges: Ranges,
@@ -162,6 +167,7 @@ impl Tracer {
         };
         let Self {
             spans,
+            paused,
             bundles,
             search,
             ranges,
@@ -177,42 +183,67 @@ impl Tracer {
                 ray: index,
                 clear,
                 end,
+                steps: 0.0,
             })
         }));
-        // Close to the surface, where rays towards the sun begin, cells of the ground say nothing.
-        let ground = surface.ground.as_ref();
-        let ground = ground.filter(|_| goal == Goal::Distance && !surface.walks());
-        if let Some(ground) = ground {
-            ground.lead(&whole.program, rays, spans, wanted.cancel)?;
-        } else if Technique::Bundles.is_used(surface.without) && !surface.walks() {
+        let ground = surface.ground.as_ref().filter(|_| !surface.walks());
+        if ground.is_none() && Technique::Bundles.is_used(surface.without) && !surface.walks() {
             // Rays that walk to their ends by themselves gain nothing by going together.
             bundles.approach(surface, rays, spans, scratch, counts);
         }
-        let results = Results {
-            scratch,
-            counts,
-            hits,
-        };
-        stopwatch.begin(part(Part::Search));
         let polished = Wanted {
             surface: whole,
             ..wanted
         };
-        let found = |found: Found, results: Results<'_>| {
-            let found = if surface.is_partial {
-                found.without_outside()
-            } else {
-                found
-            };
-            if polish.push(found) {
-                stopwatch.begin(part(Part::Polish));
-                polish.run(polished, results);
-                stopwatch.begin(part(Part::Search));
+        let goes_back = ground.is_some() && Technique::Rounds.is_used(surface.without);
+        let mut after = if goes_back { ROUND } else { f64::INFINITY };
+        // Close to the surface, where rays towards the sun begin, cells of the ground say nothing.
+        let mut is_near = goal == Goal::Occlusion;
+        loop {
+            if let Some(ground) = ground.filter(|_| !is_near) {
+                stopwatch.begin(part(Part::Bundles));
+                let bounds = ground::Bounds {
+                    field: &whole.program,
+                    level: surface.level,
+                    scratch,
+                };
+                ground.lead(bounds, rays, spans, wanted.cancel)?;
             }
-        };
-        match surface.means {
-            Means::Ranges(arithmetic) => ranges.run(wanted, arithmetic, spans, results, found)?,
-            _ => search.run(wanted, spans, results, found)?,
+            stopwatch.begin(part(Part::Search));
+            let found = |found: Found, results: Results<'_>| {
+                let found = if surface.is_partial {
+                    found.without_outside()
+                } else {
+                    found
+                };
+                if polish.push(found) {
+                    stopwatch.begin(part(Part::Polish));
+                    polish.run(polished, results);
+                    stopwatch.begin(part(Part::Search));
+                }
+            };
+            let results = Results {
+                scratch,
+                counts,
+                hits,
+            };
+            paused.clear();
+            let pause = Pause {
+                after,
+                spans: paused,
+            };
+            match surface.means {
+                Means::Ranges(arithmetic) => {
+                    ranges.run(wanted, arithmetic, spans, results, found)?
+                }
+                _ => search.run(wanted, spans, pause, results, found)?,
+            }
+            if paused.is_empty() {
+                break;
+            }
+            std::mem::swap(spans, paused);
+            is_near = false;
+            after *= 2.0;
         }
         stopwatch.begin(part(Part::Polish));
         let results = Results {

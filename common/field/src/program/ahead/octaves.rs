@@ -6,13 +6,20 @@ use super::Place;
 use super::lanes::{Row, Stretches, WIDTH, row};
 use super::stretch::{Stretch, least, most, steepness, turn};
 use crate::cascade::{self, Carried, Cascade, Model, Octave, Term, Weight};
-use crate::noise;
+use crate::noise::Limits;
 use crate::number::Number;
 use crate::op::Basis;
 use crate::program::slopes::{Sample, Tape};
 
-/// Error of a noise's derivative, as a share of the greatest there is: it is computed in f32, good to 3·10⁻⁶.
+/// Error of a noise's derivative, as a share of the greatest there is, if more is not known: it is computed in f32, good to 3·10⁻⁶.
 const SLOPE_ROUNDING: f64 = 1e-4;
+
+/// Error of a noise's derivative along a unit direction.
+#[inline(always)]
+fn error(limits: Limits) -> f64 {
+    let (share, known) = (SLOPE_ROUNDING * limits.slope, 2.0 * limits.slope_rounding);
+    most(share, known)
+}
 
 /// Error of a cascade's depth.
 const DEPTH_ROUNDING: f64 = 1e-9;
@@ -91,27 +98,35 @@ impl Octaves {
 
     /// The stretches of a noise, from what it is at the places.
     #[inline(always)]
-    pub(super) fn noise(&mut self, sample: &Sample<1>, start: usize, frequency: f64) {
+    pub(super) fn noise(
+        &mut self,
+        limits: Limits,
+        sample: &Sample<1>,
+        start: usize,
+        frequency: f64,
+    ) {
         let [slopes] = &sample.gradient;
         let (slopes, values) = (&slopes[start..][..WIDTH], &sample.noise[start..][..WIDTH]);
         // Not read from memory in the loop, which writes there: it would not become vectors.
         let back = self.back;
+        let (lowest, highest) = (limits.middle - limits.range, limits.middle + limits.range);
+        let error = error(limits);
         for i in 0..WIDTH {
             let speed = self.speed[i] * frequency;
-            let steepest = noise::SLOPE * speed;
+            let steepest = limits.slope * speed;
             let way = speed * self.length[i];
-            let room = noise::BEND * speed * way
-                + noise::SLOPE * (self.turn[i] * frequency + SLOPE_ROUNDING * speed);
+            let room =
+                limits.bend * speed * way + limits.slope * self.turn[i] * frequency + error * speed;
             let slope = f64::from(slopes[i]);
             let fall = most(slope - room, -steepest);
             let rise = least(slope + room, steepest);
             let value = f64::from(values[i]);
             // Behind the place a rise leads down.
             let (descent, ascent) = (most(-fall, back * rise), most(rise, -back * fall));
-            let down = -most(descent, 0.0) * self.length[i] - noise::ROUNDING;
-            let up = most(ascent, 0.0) * self.length[i] + noise::ROUNDING;
-            self.noise.low[i] = most(value + down, -noise::RANGE);
-            self.noise.high[i] = least(value + up, noise::RANGE);
+            let down = -most(descent, 0.0) * self.length[i] - limits.rounding;
+            let up = most(ascent, 0.0) * self.length[i] + limits.rounding;
+            self.noise.low[i] = most(value + down, lowest);
+            self.noise.high[i] = least(value + up, highest);
             self.noise.fall[i] = fall;
             self.noise.rise[i] = rise;
         }
@@ -119,11 +134,11 @@ impl Octaves {
 
     /// The stretches of a noise of which nothing is known.
     #[inline(always)]
-    fn any_noise(&mut self, frequency: f64) {
+    fn any_noise(&mut self, limits: Limits, frequency: f64) {
         for i in 0..WIDTH {
-            let steepest = noise::SLOPE * self.speed[i] * frequency;
-            self.noise.low[i] = -noise::RANGE;
-            self.noise.high[i] = noise::RANGE;
+            let steepest = limits.slope * self.speed[i] * frequency;
+            self.noise.low[i] = limits.middle - limits.range;
+            self.noise.high[i] = limits.middle + limits.range;
             self.noise.fall[i] = -steepest;
             self.noise.rise[i] = steepest;
         }
@@ -177,14 +192,15 @@ impl Octaves {
             if k >= evaluated && self.deep.iter().all(|deep| *deep <= i) {
                 break;
             }
+            let limits = octave.noise.as_ref().map_or(Limits::GRADIENT, Limits::of);
             simd.vectorize(
                 #[inline(always)]
                 || {
                     if k < evaluated {
                         let sample = tape.sample_at(place.sample + k);
-                        self.noise(sample, place.start, octave.frequency);
+                        self.noise(limits, sample, place.start, octave.frequency);
                     } else {
-                        self.any_noise(octave.frequency);
+                        self.any_noise(limits, octave.frequency);
                     }
                 },
             );

@@ -4,6 +4,8 @@
 //! It rounds to nearest: what it is used for allows for a share of every slope, far above its rounding.
 
 use crate::arithmetic::{self, Unary};
+use crate::curve::Curve;
+use crate::interval::Interval;
 use crate::number::Number;
 
 /// Stands for no bound: products of two are still finite.
@@ -134,6 +136,14 @@ impl Stretch {
         let ends = (least(p, q), most(p, q));
         let slopes = choose(crosses, hull(ends, (steepest, steepest)), ends);
         self.chain((least(a, b), most(a, b)), slopes)
+    }
+
+    /// A curve over it.
+    pub(crate) fn curve(self, curve: &Curve) -> Self {
+        let over = Interval::new(self.low, self.high);
+        let (range, slope) = (curve.range(over), curve.slope_max(over));
+        let size = slope * self.steepness();
+        Self::new((range.low, range.high), (-size, size))
     }
 
     /// ‖(a, b, c)‖.

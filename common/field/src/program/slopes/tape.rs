@@ -40,6 +40,12 @@ impl<const N: usize> Tape<N> {
         &mut self.samples[place]
     }
 
+    /// Where the last noise went.
+    pub(super) fn last(&mut self) -> &mut Sample<N> {
+        let place = if self.keeps { self.next - 1 } else { 0 };
+        &mut self.samples[place]
+    }
+
     pub(super) fn keep_cascade(&mut self, n: usize, octaves: usize, depth: &Lanes) {
         if !self.keeps {
             return;

@@ -20,7 +20,7 @@ use crate::range::Arithmetic;
 const FAR: f64 = 1e15;
 
 /// The rounding of three offsets to f32, as a distance.
-const OFFSETS: f64 = 5.2e-8;
+pub(crate) const OFFSETS: f64 = 5.2e-8;
 
 /// Room for f32 where it is asked whether a node is in reach.
 const REACHED: f64 = 1e-6;

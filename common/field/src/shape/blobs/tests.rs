@@ -1,12 +1,11 @@
 //! Blobs at many places together against one place at a time, and rays walked to their roots.
 
-use fearless_simd::dispatch;
-
 use super::{Blobs, Walk};
 use crate::hash::{hash, unit};
 use crate::number::Dual;
 use crate::points::BATCH;
 use crate::shape::kernel::Kernel;
+use crate::simd::dispatch;
 use crate::{Graph, Interval, Op, Points, Program, Scratch, SimdLevel};
 
 fn number(i: u32, k: u32) -> f64 {
@@ -110,7 +109,7 @@ fn walked(kernel: u32, weights: [f64; 2]) -> Vec<(f64, f64)> {
         limit: &[8.0; BATCH],
     };
     let mut ahead = [1.0; BATCH];
-    dispatch!(SimdLevel::best().token(), simd => blobs.walk(simd, walk, &mut ahead));
+    dispatch!(SimdLevel::best(), simd => blobs.walk(simd, walk, &mut ahead));
     let end = |i: usize| (ahead[i], blobs.value([x[i], y[i], 4.0 - ahead[i]]));
     (0..BATCH).map(end).collect()
 }
