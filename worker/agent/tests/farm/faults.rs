@@ -102,11 +102,8 @@ async fn two_coordinators_never_share_a_folder_or_a_port() {
     let other = tempfile::tempdir().unwrap();
     let mut config = Farm::config(other.path());
     config.listen = farm.address;
-    let taken = server::start(config.clone()).await.unwrap_err();
+    let taken = server::start(config).await.unwrap_err();
     assert!(matches!(taken, StartError::PortInUse(_)), "{taken}");
-    config.listen = "0.0.0.0:0".parse().unwrap();
-    let open = server::start(config).await.unwrap_err();
-    assert!(open.to_string().contains("other machines"), "{open}");
 }
 
 #[tokio::test]
