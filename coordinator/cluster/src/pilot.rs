@@ -189,6 +189,12 @@ impl Pilot {
         &self.standing
     }
 
+    /// Notes that nothing is to do, and that nothing of ours is there.
+    pub fn rests(&mut self) {
+        let standing = &mut self.standing;
+        (standing.waiting, standing.running, standing.wanted) = (0, 0, 0);
+    }
+
     /// Whether the latest allocations failed, or submissions were refused.
     pub fn is_failing(&self) -> bool {
         self.failures > 0

@@ -122,6 +122,7 @@ impl Errand {
         };
         // Nobody is asked about nothing.
         if wanted.squares == 0 && known.is_empty {
+            known.pilot.rests();
             self.show(known.pilot.standing());
             return Ok(());
         }
