@@ -204,6 +204,14 @@ fn an_image_goes_in_and_its_blocks_come_out_once() {
     let (_, bytes) = desk.look("get", &[], &[Some(blocks[blocks.len() - 1].1)]);
     assert_eq!(frames(&bytes).0, []);
 
+    // A coordinator that comes after is told what the one before had.
+    let (seen, _) = desk.look("ls", &[], &[]);
+    let had = &seen.arrays[0].had;
+    assert_eq!(had[0].0, blocks[blocks.len() - 1].1);
+    assert_eq!(had[0].blocks().collect::<BTreeSet<_>>(), found);
+    let (seen, _) = desk.look("ls", &[NAME], &[]);
+    assert!(seen.arrays[0].had.is_empty());
+
     desk.remove();
     desk.remove();
     let (seen, _) = desk.look("ls", &[], &[]);

@@ -108,6 +108,21 @@ fn grid_engine_behind_a_firewall_gives_the_frames_of_one_process() {
 
 #[test]
 #[ignore = "long: tests/run --all"]
+fn slurm_and_a_host_over_ssh_polled_give_the_frames_of_one_process() {
+    let Some(mut engine) = Engine::slurm(2) else {
+        return;
+    };
+    if !engine.add_ssh() {
+        return;
+    }
+    for kind in [Kind::SlurmOverSsh, Kind::Ssh] {
+        let more = "mode = 'poll'\nmin_tile_pixels = 5000\nmax_running = 2";
+        renders_the_same(&Flight::new(&engine, kind, more));
+    }
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
 fn a_lockout_is_no_lockout() {
     // The thesis's (§C.4): every task is killed before its tile is done.
     let Some(engine) = Engine::gridengine(1, &[("GE_DEFAULT_H_RT", "0:0:5")]) else {

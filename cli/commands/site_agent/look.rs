@@ -8,9 +8,12 @@ use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write};
 use std::path::Path;
 
 use cluster::orders::{
-    End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Look, Seen, SeenArray, SeenTask, Stands, Wants,
+    End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Had, Look, Seen, SeenArray, SeenTask, Stands,
+    Wants, edges,
 };
 use cluster::{Task, TaskState};
+use wire::block::BlockRecord;
+use wire::spool::{self, Entry};
 
 use super::folder::{Folder, cannot};
 use super::{camp, queue};
@@ -29,6 +32,9 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
     for name in names(&folder.arrays())? {
         arrays.push(array(folder, &name, &known, shown.get(&name))?);
     }
+    for wants in &request.wants {
+        note(folder, wants)?;
+    }
     // What the queue has of ours that has no folder is nobody's.
     for (name, tasks) in &shown {
         let is_there = arrays.iter().any(|array| array.name == *name);
@@ -39,6 +45,7 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
                 is_submitted: true,
                 order: None,
                 tasks: numbered(tasks, tasks.keys().max().copied().unwrap_or(0)),
+                had: Vec::new(),
             });
         }
     }
@@ -94,12 +101,75 @@ fn array(
             task.1 = file.1;
         }
     }
+    let order = order.filter(|_| !known.contains(name));
+    let had = match order {
+        Some(_) => had(folder, name)?,
+        None => Vec::new(),
+    };
     Ok(SeenArray {
         name: name.to_owned(),
         is_submitted: shown.is_some() || folder.id(name)?.is_some(),
-        order: order.filter(|_| !known.contains(name)),
+        order,
         tasks,
+        had,
     })
+}
+
+/// How much of each task's file the coordinator had when it asked last.
+fn offsets(folder: &Folder, array: &str) -> Result<Vec<u64>, Error> {
+    // One that cannot be read costs no more than that blocks are fetched once more.
+    let text = fs::read(folder.had(array)?).unwrap_or_default();
+    Ok(serde_json::from_slice(&text).unwrap_or_default())
+}
+
+/// Notes what the coordinator has, for one that comes after it.
+fn note(folder: &Folder, wants: &Wants) -> Result<(), Error> {
+    let before = offsets(folder, &wants.array)?;
+    let offset = |(place, offset): (usize, &Option<u64>)| {
+        let before = before.get(place).copied().unwrap_or(0);
+        offset.unwrap_or(before)
+    };
+    let now: Vec<u64> = wants.offsets.iter().enumerate().map(offset).collect();
+    if now == before || now.iter().all(|&offset| offset == 0) {
+        return Ok(());
+    }
+    let path = folder.had(&wants.array)?;
+    // It is of use alone; an array that was removed meanwhile has no folder, and a disk that is full has no room.
+    if path.parent().is_some_and(Path::is_dir) {
+        let text = serde_json::to_vec(&now).unwrap_or_default();
+        let _ = super::folder::write(&path, &text);
+    }
+    Ok(())
+}
+
+/// What the coordinator had, block by block.
+fn had(folder: &Folder, array: &str) -> Result<Vec<Had>, Error> {
+    let mut all = Vec::new();
+    for (task, offset) in (1..).zip(offsets(folder, array)?) {
+        let path = folder.blocks(array, task)?;
+        let mut bytes = Vec::new();
+        if offset > 0 {
+            let read = File::open(&path).and_then(|file| file.take(offset).read_to_end(&mut bytes));
+            read.map_err(cannot("read", &path))?;
+        }
+        let mut had = Had(offset, Vec::new());
+        let mut rest = &bytes[..];
+        loop {
+            let length = match spool::read(rest) {
+                Entry::Block(delivery, length) => {
+                    if let Ok(record) = BlockRecord::only(&delivery.record) {
+                        had.1.push(edges(record.header.rect));
+                    }
+                    length
+                }
+                Entry::Damaged(length) => length,
+                Entry::End => break,
+            };
+            rest = &rest[length..];
+        }
+        all.push(had);
+    }
+    Ok(all)
 }
 
 /// What is in a folder, with its length. One that is gone is empty.
@@ -177,7 +247,7 @@ fn send(
     let mut bytes = Vec::new();
     file.take(room.bytes).read_to_end(&mut bytes)?;
     let (mut rest, mut at) = (&bytes[..], offset);
-    while let Some(length) = wire::spool::length(rest) {
+    while let Some(length) = spool::length(rest) {
         if room.blocks == 0 {
             return Ok(End::More);
         }

@@ -6,6 +6,7 @@
 //! ```text
 //! arrays/NAME/order.json     what is to be rendered
 //! arrays/NAME/id             the queue's number of the array, once it was submitted
+//! arrays/NAME/had.json       how much of each task's file the coordinator had when it asked last
 //! arrays/NAME/TASK.blocks    finished blocks, one after the other (`wire::spool`)
 //! scenes/DIGEST              scene descriptions and assets
 //! ```
@@ -161,7 +162,8 @@ impl From<&Lease> for TaskOrder {
     }
 }
 
-fn edges(rect: Rect) -> [u32; 4] {
+/// A rectangle's edges: x0, y0, x1, y1.
+pub fn edges(rect: Rect) -> [u32; 4] {
     [rect.x0, rect.y0, rect.x1, rect.y1]
 }
 
@@ -236,6 +238,20 @@ pub struct SeenArray {
     pub order: Option<Order>,
     /// Its tasks, from number 1 on.
     pub tasks: Vec<SeenTask>,
+    /// What a coordinator had of each when it asked last, where the order is told.
+    #[serde(default)]
+    pub had: Vec<Had>,
+}
+
+/// What a coordinator had of a task: bytes of its file, and the blocks in them.
+#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
+pub struct Had(pub u64, pub Vec<[u32; 4]>);
+
+impl Had {
+    /// The blocks.
+    pub fn blocks(&self) -> impl Iterator<Item = Rect> {
+        self.1.iter().copied().map(rect)
+    }
 }
 
 /// How a task stands, and how many bytes its file has.

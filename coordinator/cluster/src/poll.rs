@@ -12,7 +12,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use model::{AttemptId, Begun, Digest, ImageRef, Lease, Rect, Revision, Running, Span, Timestamp};
 
-use crate::orders::{Order, Seen, SeenArray, Stands, TaskOrder, Wants};
+use crate::orders::{Had, Order, Seen, SeenArray, Stands, TaskOrder, Wants};
 use crate::queue::Limits;
 use crate::sites::{Kind, Site};
 
@@ -142,8 +142,9 @@ pub struct Poll {
 struct Tile {
     lease: Lease,
     missing: BTreeSet<Rect>,
-    /// Blocks that have arrived.
+    /// Blocks that have arrived, those that an earlier coordinator had among them.
     arrived: u32,
+    inherited: u32,
     /// How long they took one thread.
     took: Span,
     /// Bytes of its file that are done with.
@@ -268,20 +269,30 @@ impl Poll {
                 continue;
             }
             let mut tiles = vec![None; order.tasks.len()];
-            for ((number, task), tile) in (1..).zip(&array.tasks).zip(&mut tiles) {
+            for (index, (task, tile)) in array.tasks.iter().zip(&mut tiles).enumerate() {
+                let number = u32::try_from(index + 1).unwrap_or(u32::MAX);
                 let has_begun = task.0 != Stands::Waits && (task.0 == Stands::Runs || task.1 > 0);
                 let Some(lease) = order.lease(number).filter(|_| has_begun) else {
                     continue;
                 };
                 *tile = Some(lease.attempt);
-                begun.push(Begun {
+                let claim = Begun {
                     attempt: lease.attempt,
                     image: lease.image,
                     tile: lease.tile,
-                });
+                };
                 let place = (array.name.clone(), number);
-                self.tiles
-                    .insert(lease.attempt, Tile::new(lease, Some(place)));
+                let mut taken = Tile::new(lease, Some(place));
+                if let Some(had) = array.had.get(index) {
+                    taken.inherits(had);
+                }
+                // Of one that is whole nothing more is wanted.
+                if taken.missing.is_empty() {
+                    *tile = None;
+                    continue;
+                }
+                begun.push(claim);
+                self.tiles.insert(claim.attempt, taken);
             }
             let found = Array {
                 tiles,
@@ -416,7 +427,7 @@ impl Poll {
             let history = self.histories.entry(key).or_default();
             history.observation = self.observations;
             history.limit = self.arrays.get(&array).and_then(|array| array.time_limit);
-            match tile.arrived {
+            match tile.arrived - tile.inherited {
                 0 => history.tries += 1,
                 blocks => {
                     history.tries = 0;
@@ -575,11 +586,21 @@ impl Tile {
             missing: lease.blocks().collect(),
             lease,
             arrived: 0,
+            inherited: 0,
             took: Span(0),
             offset: 0,
             runs: false,
             place,
         }
+    }
+
+    /// An earlier coordinator had this of it already.
+    fn inherits(&mut self, had: &Had) {
+        self.offset = had.0;
+        for block in had.blocks() {
+            self.inherited += u32::from(self.missing.remove(&block));
+        }
+        self.arrived = self.inherited;
     }
 }
 

@@ -479,6 +479,21 @@ mod tests {
     }
 
     #[test]
+    fn what_arrived_before_a_cut_is_given() {
+        let script = "printf 'a\\377\\000b'; exec sleep 1000";
+        let (bytes, ended) = here("").fetch("fetching", script, Span::from_millis(500));
+        assert_eq!(bytes, b"a\xff\0b");
+        assert!(matches!(ended, Err(ClusterError::TimedOut { .. })));
+        let (bytes, ended) = here("").fetch("fetching", "echo x; echo no room >&2; exit 3", LIMIT);
+        assert_eq!(bytes, b"x\n");
+        let error = ended.unwrap_err().to_string();
+        assert!(error.contains("no room"), "{error}");
+        let (bytes, ended) = here("").fetch("fetching", "printf whole", LIMIT);
+        assert_eq!(bytes, b"whole");
+        ended.unwrap();
+    }
+
+    #[test]
     fn output_is_limited() {
         let error = here("").run("talking", "yes", LIMIT).unwrap_err();
         assert!(error.to_string().contains("is longer than"), "{error}");

@@ -68,6 +68,7 @@ impl There {
                     is_submitted: true,
                     order: Some(order.clone()),
                     tasks: vec![SeenTask(Stands::Waits, 0); order.tasks.len()],
+                    had: Vec::new(),
                 }),
                 Action::Remove(names) => self.seen.arrays.retain(|a| !names.contains(&a.name)),
                 _ => {}
@@ -231,6 +232,34 @@ fn what_ran_is_taken_up_and_what_waited_is_deleted() {
     assert_eq!(now.looks(), [Action::Delete(vec![(order.name, Some(3))])]);
     assert_eq!(now.looks(), []);
     assert_eq!(now.poll.wants()[0].offsets, [Some(0), None, None]);
+}
+
+#[test]
+fn what_was_fetched_before_is_not_fetched_again() {
+    let mut before = there();
+    before.poll.leased(lease(0, 0));
+    before.poll.leased(lease(1, 0));
+    before.submits();
+    before.are(Stands::Ended);
+    let mut now = there();
+    now.seen = before.seen;
+    let blocks = |number: u64, count| {
+        let tile = lease(number, 0).tile;
+        tile.blocks()
+            .take(count)
+            .map(crate::orders::edges)
+            .collect()
+    };
+    let array = &mut now.seen.arrays[0];
+    array.tasks = vec![SeenTask(Stands::Ended, 99); 2];
+    array.had = vec![Had(70, blocks(0, 1)), Had(99, blocks(1, 2))];
+    let begun = now.poll.takes_up(&now.seen);
+    assert_eq!(begun.len(), 1);
+    now.poll.keeps(&[attempt(0)]);
+    assert_eq!(now.poll.wants()[0].offsets, [Some(70), None]);
+    let rest = lease(0, 0).tile.blocks().nth(1).unwrap();
+    now.poll.delivered(attempt(0), rest, TAKES);
+    assert!(now.poll.held().is_empty());
 }
 
 #[test]
