@@ -12,6 +12,7 @@ mod noise;
 mod render;
 mod scene;
 mod site;
+mod site_agent;
 mod submit;
 mod token;
 mod version;
@@ -82,6 +83,9 @@ enum Command {
     /// Clusters and hosts that `sites.toml` names: what they are like, the program there.
     #[command(subcommand)]
     Site(site::SiteCommand),
+    /// What a coordinator calls on the login node of a site in poll mode, and what the tasks there run.
+    #[command(subcommand, hide = true)]
+    SiteAgent(site_agent::SiteAgent),
     /// Tokens, by which users and workers on other machines reach the farm.
     #[command(subcommand)]
     Token(token::TokenCommand),
@@ -125,6 +129,7 @@ pub(crate) fn run(cli: Cli, state: Option<PathBuf>) -> Result<Ending, Error> {
         Command::Submit(options) => submit::run(&context, &options),
         Command::Job(command) => job::run(&context, command),
         Command::Site(command) => site::run(&context, command),
+        Command::SiteAgent(command) => site_agent::run(&command),
         Command::Token(command) => token::run(&context, command),
         Command::Farm(command) => farm::run(&context, command),
         Command::Scene(command) => scene::run(&context, command),

@@ -14,7 +14,10 @@
 #[path = "../harness/mod.rs"]
 mod harness;
 
+mod agent;
 mod backends;
 mod commands;
 mod engine;
+mod flight;
 mod pilot;
+mod poll;

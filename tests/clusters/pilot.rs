@@ -6,117 +6,15 @@ use std::os::unix::fs::PermissionsExt as _;
 use serde_json::Value;
 
 use crate::engine::{Engine, Kind};
-use crate::harness::scenes::{ENDLESS, FLYBY, TINY, slow, small};
-use crate::harness::{Farm, Place, wait};
-
-/// A farm whose coordinator has one site, called `test`.
-struct Flight {
-    farm: Farm,
-}
-
-impl Flight {
-    /// With these further lines in `sites.toml`.
-    fn new(engine: &Engine, kind: Kind, more: &str) -> Self {
-        Self::with_program(engine, kind, env!("CARGO_BIN_EXE_flyby"), more)
-    }
-
-    /// The same, with another program at the site.
-    fn with_program(engine: &Engine, kind: Kind, program: &str, more: &str) -> Self {
-        let place = Place::new();
-        let (site, there) = (engine.site(kind), place.path("there"));
-        let text = format!(
-            "[site.test]\n{site}folder = '{}'\nprogram = '{program}'\npoll = '1 s'\n{more}\n",
-            there.display(),
-        );
-        place.write("sites.toml", text);
-        Self {
-            farm: Farm::wrapped(place, &[], &["--sites", "sites.toml"]),
-        }
-    }
-
-    /// The site, as the coordinator sees it.
-    fn site(&self) -> Value {
-        let list = self.farm.flyby(["site", "list", "--output", "json"]).json();
-        list["sites"][0]["seen"].clone()
-    }
-
-    fn count(&self, name: &str) -> u64 {
-        self.site()[name].as_u64().unwrap()
-    }
-
-    #[track_caller]
-    fn wait_trouble(&self, phrases: &[&str]) {
-        let what = format!("the site's trouble holds {phrases:?}");
-        wait::until(&what, || {
-            let site = self.site();
-            let trouble = site["trouble"].as_str()?;
-            phrases
-                .iter()
-                .all(|phrase| trouble.contains(phrase))
-                .then_some(())
-        });
-    }
-
-    fn clean(&self) {
-        let clean = ["site", "clean", "test", "--sites", "sites.toml"];
-        self.farm.flyby(clean).ok();
-    }
-
-    /// Nothing of the farm is left at the site: neither folder nor process.
-    #[track_caller]
-    fn has_left_nothing(&self) {
-        let there = self.farm.place.path("there");
-        let left: Vec<_> = fs::read_dir(&there)
-            .into_iter()
-            .flatten()
-            .flatten()
-            .collect();
-        assert!(left.is_empty(), "{left:?}");
-        wait::until("no process of the site is left", || {
-            processes_with(&there.display().to_string())
-                .is_empty()
-                .then_some(())
-        });
-    }
-}
-
-/// Whatever becomes of a test, no process of a host without a queue stays behind.
-impl Drop for Flight {
-    fn drop(&mut self) {
-        // It would submit again.
-        if self.farm.coordinator.ended().is_none() {
-            self.farm.coordinator.kill();
-        }
-        let _ = self
-            .farm
-            .place
-            .flyby(["site", "clean", "test", "--sites", "sites.toml"]);
-    }
-}
-
-/// The command lines that hold a text, of everybody but who looks.
-fn processes_with(text: &str) -> Vec<String> {
-    let entries = fs::read_dir("/proc").unwrap().flatten();
-    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
-    let lines = lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " "));
-    lines.filter(|line| line.contains(text)).collect()
-}
+use crate::flight::{Flight, renders_the_same};
+use crate::harness::scenes::{ENDLESS, FLYBY, TINY, slow};
+use crate::harness::{Place, wait};
 
 /// What the queue shows of anybody's, a line for each task.
 fn queue(engine: &Engine, options: &[&str]) -> Vec<String> {
     let words = [&["-h", "-r", "-o", "%F_%K %T %j"][..], options].concat();
     let said = engine.slurm_tool("squeue", &words);
     said.lines().map(str::to_owned).collect()
-}
-
-/// The same frames as one process renders, and nothing left behind.
-fn renders_the_same(flight: &Flight) {
-    let job = flight.farm.submit(&small().with(&[FLYBY]));
-    let done = flight.farm.wait_done(job);
-    assert_eq!(done.film_digests(), small().digests);
-    assert_eq!(done.number("blocks_again"), 0, "{done:?}");
-    flight.clean();
-    flight.has_left_nothing();
 }
 
 #[test]

@@ -58,25 +58,28 @@ pub(crate) fn small() -> &'static Reference {
 /// Two images of 200×150 pixels with as many rays as keep one thread of this machine busy for seconds.
 pub(crate) fn slow() -> &'static Reference {
     static SLOWLY: OnceLock<Reference> = OnceLock::new();
-    SLOWLY.get_or_init(|| {
-        let start = Instant::now();
-        let quick = [
-            "--resolution",
-            "200x150",
-            "--rays",
-            "1",
-            "--frames",
-            "0..2",
-            "--threads",
-            "1",
-        ];
-        rendered(&Place::new(), "quick", &quick);
-        let (mut rays, took) = (1, start.elapsed());
-        while took * (rays * rays) < SLOW {
-            rays += 1;
-        }
-        Reference::new(rays)
-    })
+    SLOWLY.get_or_init(|| lasting(SLOW))
+}
+
+/// The same, with as many rays as keep one thread busy for so long.
+pub(crate) fn lasting(time: Duration) -> Reference {
+    let start = Instant::now();
+    let quick = [
+        "--resolution",
+        "200x150",
+        "--rays",
+        "1",
+        "--frames",
+        "0..2",
+        "--threads",
+        "1",
+    ];
+    rendered(&Place::new(), "quick", &quick);
+    let (mut rays, took) = (1, start.elapsed());
+    while took * (rays * rays) < time {
+        rays += 1;
+    }
+    Reference::new(rays)
 }
 
 /// Renders in one process; answers the frames' film digests, as their files tell them.

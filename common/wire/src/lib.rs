@@ -4,6 +4,7 @@
 //! - [`convert`]: from messages into `model`'s types, so that inside the farm
 //!   nothing is left to validate; and back.
 //! - [`block`]: the block record, the same bytes wherever finished pixels travel.
+//! - [`spool`]: finished blocks in a file.
 //! - [`failure`]: why a call failed: a kind, whether to try again, a sentence.
 //! - [`auth`]: the token that guards a coordinator, as metadata.
 //! - [`place`]: the state folder's files through which the parts on one machine find each other.
@@ -23,6 +24,7 @@ pub mod failure;
 pub mod link;
 #[cfg(feature = "grpc")]
 pub mod place;
+pub mod spool;
 #[cfg(feature = "grpc")]
 pub mod tls;
 pub mod version;

@@ -102,6 +102,11 @@ impl Camp {
         }
     }
 
+    /// The farm's name.
+    pub(crate) fn farm(&self) -> &str {
+        &self.farm
+    }
+
     /// What the names of its arrays begin with. No other site's do, since no site's name has a dot.
     pub fn prefix(&self) -> String {
         format!("flyby-{}-{}.", self.farm, self.site.name)

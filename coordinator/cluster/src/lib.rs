@@ -11,6 +11,8 @@
 //! - [`camp`]: what one farm has at one site.
 //! - [`survey`]: what a site is like, for `flyby site check`; [`install`]: the program brought there.
 //! - [`pilot`]: how many allocations a site should have, a function of what was seen.
+//! - [`orders`]: what the coordinator and `flyby site-agent` on a login node say to each other in poll mode;
+//!   [`poll`]: which arrays a polled site should have, a function of what was seen.
 //!
 //! `tests/clusters` shows it whole on real engines.
 
@@ -18,7 +20,9 @@ pub mod camp;
 mod error;
 mod gridengine;
 pub mod install;
+pub mod orders;
 pub mod pilot;
+pub mod poll;
 mod processes;
 pub mod queue;
 pub mod sites;

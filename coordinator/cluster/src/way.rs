@@ -99,29 +99,60 @@ impl Way {
         }
     }
 
+    /// [`Way::run`], of which what is printed counts as bytes, and also where the link was cut half-way: with the
+    /// error comes what had arrived.
+    pub fn fetch(
+        &self,
+        attempt: &str,
+        script: &str,
+        limit: Span,
+    ) -> (Vec<u8>, Result<(), ClusterError>) {
+        let (raw, ended) = self.perform(attempt, self.shell(), &self.group(script)[..], limit);
+        let mark = format!("{MARK}\n").into_bytes();
+        let begins = raw
+            .stdout
+            .windows(mark.len())
+            .position(|window| window == mark);
+        let stdout = match begins {
+            Some(place) => raw.stdout[place + mark.len()..].to_vec(),
+            None => Vec::new(),
+        };
+        let ended = ended.and_then(|()| match (raw.code, begins) {
+            (Some(0), Some(_)) => Ok(()),
+            (_, None) => Err(not_begun(attempt, &raw.said())),
+            (_, Some(_)) => {
+                let said = Said {
+                    stdout: String::new(),
+                    ..raw.said()
+                };
+                Err(said.refused(attempt, "flyby"))
+            }
+        });
+        (stdout, ended)
+    }
+
     /// Runs a script of POSIX shell there. An error is that it did not run; how it ended is for the caller.
     pub fn run(&self, attempt: &str, script: &str, limit: Span) -> Result<Said, ClusterError> {
-        let setup = self.setup.as_deref().unwrap_or(":");
-        let group = format!("{{\n{setup}\necho {MARK}\n{script}\n}} </dev/null\n");
-        let command = self.command("exec /bin/sh -s", &["-s"]);
-        let said = self.perform(attempt, command, group.into_bytes().as_slice(), limit)?;
-        let (before, stdout) = match said.stdout.split_once(&format!("{MARK}\n")) {
-            Some((_, after)) => (None, after.to_owned()),
-            None => (Some(said.stdout.as_str()), String::new()),
-        };
-        match before {
-            // The setup ended the shell, or nobody runs scripts there.
-            Some(words) => {
-                let words = format!("{words}\n{}", said.stderr);
-                Err(ClusterError::Nonsense {
-                    attempt: attempt.to_owned(),
-                    what: "the shell there ended before it began; look at the site's `setup`"
-                        .to_owned(),
-                    said: brief(&words),
-                })
-            }
-            None => Ok(Said { stdout, ..said }),
+        let (raw, ended) = self.perform(attempt, self.shell(), &self.group(script)[..], limit);
+        ended?;
+        let said = raw.said();
+        match said.stdout.split_once(&format!("{MARK}\n")) {
+            Some((_, after)) => Ok(Said {
+                stdout: after.to_owned(),
+                ..said
+            }),
+            None => Err(not_begun(attempt, &said)),
         }
+    }
+
+    /// A script as it travels.
+    fn group(&self, script: &str) -> Vec<u8> {
+        let setup = self.setup.as_deref().unwrap_or(":");
+        format!("{{\n{setup}\necho {MARK}\n{script}\n}} </dev/null\n").into_bytes()
+    }
+
+    fn shell(&self) -> Command {
+        self.command("exec /bin/sh -s", &["-s"])
     }
 
     /// [`Way::run`], where the script must end well; `program` is what it needs there.
@@ -157,7 +188,9 @@ impl Way {
         );
         let there = format!("exec /bin/sh -c {}", quote_always(&script));
         let command = self.command(&there, &["-c", &script]);
-        let said = self.perform(&attempt, command, &mut from, limit)?;
+        let (raw, ended) = self.perform(&attempt, command, &mut from, limit);
+        ended?;
+        let said = raw.said();
         match said.code {
             Some(0) => Ok(()),
             _ => Err(said.refused(&attempt, "cat")),
@@ -179,13 +212,14 @@ impl Way {
         }
     }
 
+    /// Runs a command; beside what it said, whether it ended by itself and was there at all.
     fn perform(
         &self,
         attempt: &str,
         mut command: Command,
         input: impl Read + Send,
         limit: Span,
-    ) -> Result<Said, ClusterError> {
+    ) -> (Raw, Result<(), ClusterError>) {
         let deadline = Instant::now() + Duration::from_micros(limit.0);
         let program = command.get_program().to_string_lossy().into_owned();
         let child = command
@@ -194,8 +228,11 @@ impl Way {
             .stderr(Stdio::piped())
             .process_group(0)
             .spawn()
-            .map_err(|source| ClusterError::Start { program, source })?;
-        let mut child = Group(child);
+            .map_err(|source| ClusterError::Start { program, source });
+        let mut child = match child {
+            Ok(child) => Group(child),
+            Err(error) => return (Raw::default(), Err(error)),
+        };
         let stdout = Gathered::from(child.0.stdout.take(), STDOUT_MAX);
         let stderr = Gathered::from(child.0.stderr.take(), STDERR_MAX);
         let stdin = child.0.stdin.take();
@@ -209,29 +246,62 @@ impl Way {
             });
             child.wait(deadline, &stdout)
         });
-        let Some(status) = ended else {
-            return Err(ClusterError::TimedOut {
+        let raw = Raw {
+            code: ended.and_then(|status| status.code()),
+            stdout: stdout.bytes(),
+            stderr: stderr.bytes(),
+        };
+        if ended.is_none() {
+            let late = ClusterError::TimedOut {
                 attempt: attempt.to_owned(),
                 limit,
-            });
-        };
-        let said = Said {
-            code: status.code(),
-            stdout: stdout.text(),
-            stderr: stderr.text(),
-        };
+            };
+            return (raw, Err(late));
+        }
         if stdout.is_full() {
-            return Err(ClusterError::Nonsense {
+            let error = ClusterError::Nonsense {
                 attempt: attempt.to_owned(),
                 what: format!("it is longer than {STDOUT_MAX} bytes"),
-                said: brief(&said.stdout),
-            });
+                said: brief(&raw.said().stdout),
+            };
+            return (raw, Err(error));
         }
-        match (&self.address, said.code) {
+        match (&self.address, raw.code) {
             // Of its own troubles ssh tells by this code alone.
-            (Some(address), Some(255)) => Err(not_there(address, &said.stderr)),
-            _ => Ok(said),
+            (Some(address), Some(255)) => {
+                let error = not_there(address, &raw.said().stderr);
+                (raw, Err(error))
+            }
+            _ => (raw, Ok(())),
         }
+    }
+}
+
+/// What a command said, as it came.
+#[derive(Default)]
+struct Raw {
+    code: Option<i32>,
+    stdout: Vec<u8>,
+    stderr: Vec<u8>,
+}
+
+impl Raw {
+    fn said(&self) -> Said {
+        Said {
+            code: self.code,
+            stdout: String::from_utf8_lossy(&self.stdout).into_owned(),
+            stderr: String::from_utf8_lossy(&self.stderr).into_owned(),
+        }
+    }
+}
+
+/// The setup ended the shell, or nobody runs scripts there.
+fn not_begun(attempt: &str, said: &Said) -> ClusterError {
+    let words = format!("{}\n{}", said.stdout, said.stderr);
+    ClusterError::Nonsense {
+        attempt: attempt.to_owned(),
+        what: "the shell there ended before it began; look at the site's `setup`".to_owned(),
+        said: brief(&words),
     }
 }
 
@@ -354,10 +424,10 @@ impl Gathered {
         bytes.len() >= self.most
     }
 
-    fn text(&self) -> String {
+    fn bytes(&self) -> Vec<u8> {
         let _ = self.ended.recv_timeout(LATE);
         let bytes = self.bytes.lock().unwrap_or_else(PoisonError::into_inner);
-        String::from_utf8_lossy(&bytes).into_owned()
+        bytes.clone()
     }
 }
 

@@ -3,12 +3,13 @@
 use std::collections::BTreeSet;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
 use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
 use sched::{BlockRef, Command, Event, LinkId, Offer};
 use store::Entry;
-use tokio::sync::{OwnedSemaphorePermit, broadcast, mpsc, oneshot};
+use tokio::sync::{OwnedSemaphorePermit, Semaphore, broadcast, mpsc, oneshot};
 use tonic::Status;
 use wire::Failure;
 use wire::proto;
@@ -174,6 +175,27 @@ pub(crate) struct Link<T> {
     pub(crate) _alive: oneshot::Sender<()>,
 }
 
+/// What whoever brings blocks and opens links must pass, wherever it comes from.
+#[derive(Clone, Debug)]
+pub(crate) struct Gates {
+    /// A permit for each block that is not durable yet.
+    pub(crate) blocks: Arc<Semaphore>,
+    links: Arc<AtomicU64>,
+}
+
+impl Gates {
+    pub(crate) fn new(blocks_max: usize) -> Self {
+        Self {
+            blocks: Arc::new(Semaphore::new(blocks_max)),
+            links: Arc::new(AtomicU64::new(1)),
+        }
+    }
+
+    pub(crate) fn next_link(&self) -> LinkId {
+        LinkId(self.links.fetch_add(1, Ordering::Relaxed))
+    }
+}
+
 /// A worker's hello, checked.
 #[derive(Debug)]
 pub(crate) struct Greeting {
@@ -182,6 +204,8 @@ pub(crate) struct Greeting {
     pub(crate) protocol: u32,
     pub(crate) revision: Revision,
     pub(crate) threads: u32,
+    /// How it takes tiles where it stands for a cluster's queue.
+    pub(crate) queue: Option<sched::Queue>,
     pub(crate) held: Vec<model::AttemptId>,
     pub(crate) begun: Vec<model::Begun>,
     pub(crate) about: AboutWorker,

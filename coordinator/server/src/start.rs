@@ -16,7 +16,7 @@ use wire::auth::Token;
 use crate::clock::Clock;
 use crate::config::Config;
 use crate::grpc::{self, Door};
-use crate::input::{Input, News};
+use crate::input::{Gates, Input, News};
 use crate::shell::{Kept, Shell};
 use crate::sites::Sites;
 use crate::state::{State, StateError};
@@ -115,7 +115,14 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
         Storage::start(news.clone(), Box::new(store), open).map_err(StartError::Thread)?;
     let jobs = kept.len();
     let addresses = addresses::of(&config.advertise, address);
-    let sites = Sites::start(&config, &state, (address, &addresses), &trust, &inputs)?;
+    let gates = Gates::new(config.limits.blocks_in_flight_max);
+    let sites = Sites::start(
+        &config,
+        &state,
+        (address, &addresses),
+        &trust,
+        (&inputs, &gates),
+    )?;
     let board = sites.board().clone();
     let mut shell = Shell::new(
         config.clone(),
@@ -132,7 +139,7 @@ pub async fn start(config: Config) -> Result<Running, StartError> {
         state.clone(),
         trust,
         addresses,
-        board,
+        (board, gates),
     );
     let (stop, stopped) = oneshot::channel();
     let token = state.token().clone();

@@ -209,7 +209,7 @@ impl Check<'_> {
             max_array_size: self.whole(text.max_array_size.as_ref(), "max_array_size", 1..=1 << 24),
             max_running: self.whole(text.max_running.as_ref(), "max_running", 1..=100_000),
             poll: self
-                .span(text.poll.as_ref(), "1 s", "1 h")
+                .span(text.poll.as_ref(), "1 s", "5 min")
                 .unwrap_or(Span::from_secs(30)),
             ahead: self
                 .whole(text.ahead.as_ref(), "ahead", 0..=64)

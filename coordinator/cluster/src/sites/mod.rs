@@ -1,6 +1,7 @@
 //! What `sites.toml` says of each site: appendix C's `grid.conf` (thesis §C.3.2).
 
 mod file;
+pub(crate) mod microseconds;
 mod mistake;
 #[cfg(test)]
 mod tests;
@@ -17,7 +18,7 @@ pub use mistake::{Mistake, SitesError};
 pub struct Sites(pub Vec<Site>);
 
 /// A cluster with a queue of its own, a host, or this machine.
-#[derive(Clone, PartialEq, Eq, Debug)]
+#[derive(Clone, PartialEq, Eq, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Site {
     /// What it is called: letters, digits, `-` and `_`, 32 at most.
     pub name: String,
@@ -38,10 +39,12 @@ pub struct Site {
     /// Most allocations that run at a time, as far as the user or the queue (`maxujobs`) allows; `None`: no limit.
     pub max_running: Option<u32>,
     /// How often the queue is asked.
+    #[serde(with = "microseconds")]
     pub poll: Span,
     /// In pilot mode allocations, in poll mode images, that wait in the queue beyond what runs (thesis §C.3.5).
     pub ahead: u32,
     /// How long an allocation may run; `None`: as long as the queue lets it.
+    #[serde(with = "microseconds::perhaps")]
     pub time_limit: Option<Span>,
     /// Partition (Slurm) or queue (Grid Engine); `None`: the queue's usual one.
     pub queue: Option<String>,
@@ -64,6 +67,7 @@ pub struct Site {
     /// A script in the place of the one in `deploy/`.
     pub template: Option<PathBuf>,
     /// A worker without a tile for so long gives its allocation back.
+    #[serde(with = "microseconds")]
     pub idle: Span,
     /// Where the site's workers reach the coordinator; `None`: where it listens.
     pub coordinator: Option<String>,
@@ -72,7 +76,7 @@ pub struct Site {
 }
 
 /// What gives out a site's processors.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
     /// Slurm.
@@ -86,7 +90,7 @@ pub enum Kind {
 }
 
 /// Who begins.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
     /// Workers dial the coordinator.
@@ -99,7 +103,7 @@ pub enum Mode {
 }
 
 /// What becomes of an allocation that somebody else deleted.
-#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Deserialize)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug, Default, serde::Serialize, serde::Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Cancelled {
     /// Another is submitted in its place, after a while.

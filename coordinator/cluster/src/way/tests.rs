@@ -91,3 +91,18 @@ fn what_ssh_says_is_told_apart() {
     let away = said("ssh: connect to host b port 22: Connection refused");
     assert!(matches!(away, ClusterError::Unreachable { .. }) && away.may_pass());
 }
+
+#[test]
+fn what_arrived_before_a_cut_is_given() {
+    let script = "printf 'a\\377\\000b'; exec sleep 1000";
+    let (bytes, ended) = here("").fetch("fetching", script, Span::from_millis(500));
+    assert_eq!(bytes, b"a\xff\0b");
+    assert!(matches!(ended, Err(ClusterError::TimedOut { .. })));
+    let (bytes, ended) = here("").fetch("fetching", "echo x; echo no room >&2; exit 3", LIMIT);
+    assert_eq!(bytes, b"x\n");
+    let error = ended.unwrap_err().to_string();
+    assert!(error.contains("no room"), "{error}");
+    let (bytes, ended) = here("").fetch("fetching", "printf whole", LIMIT);
+    assert_eq!(bytes, b"whole");
+    ended.unwrap();
+}

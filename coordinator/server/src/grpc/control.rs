@@ -55,7 +55,7 @@ pub(super) async fn open(
     };
     let (alive, dead) = oneshot::channel();
     let link = Link {
-        id: door.next_link(),
+        id: door.gates.next_link(),
         down,
         _alive: alive,
     };
@@ -131,6 +131,7 @@ fn greeting(hello: proto::Hello, link: Link<proto::ControlDown>) -> Result<Greet
         protocol,
         revision: Revision(hello.revision),
         threads: convert::number(hello.threads, "hello.threads", 1..=4_096)?,
+        queue: None,
         held: convert::list(hello.held, "hello.held", ATTEMPTS_MAX)?,
         begun: convert::list(hello.begun, "hello.begun", RUNNING_MAX)?,
         about: AboutWorker {

@@ -47,7 +47,7 @@ pub(super) async fn open(
     };
     let worker: WorkerId = convert::require(hello.worker, "hello.worker")?.into();
     let (alive, dead) = oneshot::channel();
-    let id = door.next_link();
+    let id = door.gates.next_link();
     let link = Link {
         id,
         down: down.clone(),
@@ -64,7 +64,7 @@ pub(super) async fn open(
         worker,
         link: id,
         inputs: door.inputs.clone(),
-        blocks: door.blocks.clone(),
+        blocks: door.gates.blocks.clone(),
         // Only a weak end: the stream must end when the loop drops its own.
         down: down.downgrade(),
     };
@@ -157,10 +157,11 @@ impl Listener {
     }
 }
 
+/// What a delivery brings: whose block, its pixels, what was counted.
 type Read = (BlockHeader, Bytes, Vec<(String, u64)>);
 
 /// A delivery, checked.
-fn read(delivery: &proto::Delivery) -> Result<Read, Failure> {
+pub(crate) fn read(delivery: &proto::Delivery) -> Result<Read, Failure> {
     let record = BlockRecord::only(&delivery.record)?;
     if delivery.counters.len() > COUNTERS_MAX {
         return Err(Failure::new(

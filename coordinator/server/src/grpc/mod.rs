@@ -15,10 +15,8 @@ mod workers;
 use std::collections::BTreeSet;
 use std::future::Future;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
-use sched::LinkId;
 use tokio::sync::{Semaphore, mpsc, oneshot};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::Request;
@@ -32,13 +30,15 @@ use wire::{BadMessage, Failure, convert};
 
 use crate::config::Config;
 use crate::inbox::Inbox;
-use crate::input::{Input, Reply};
+use crate::input::{Gates, Input, Reply};
 use crate::sites::Board;
 use crate::space::Space;
 use crate::state::State;
 use crate::trust::Trust;
 use crate::trust::acceptor::Connection;
 use crate::trust::gate::{Gated, Who};
+
+pub(crate) use self::delivery::read as read_delivery;
 
 /// Most calls at the same time on one connection.
 const STREAMS_MAX: u32 = 256;
@@ -64,10 +64,9 @@ pub(crate) struct Door {
     loopback_only: bool,
     inbox: Inbox,
     submissions: Arc<Semaphore>,
-    blocks: Arc<Semaphore>,
+    gates: Gates,
     watchers: Arc<Semaphore>,
     sites: Board,
-    next_link: AtomicU64,
 }
 
 impl Door {
@@ -77,18 +76,17 @@ impl Door {
         state: Arc<State>,
         trust: Arc<Trust>,
         addresses: Vec<String>,
-        sites: Board,
+        (sites, gates): (Board, Gates),
     ) -> Self {
         let limits = &config.limits;
         Self {
             inputs,
             inbox: Inbox::new(state.inbox(), limits.asset_bytes_max),
             submissions: Arc::new(Semaphore::new(limits.submissions_max)),
-            blocks: Arc::new(Semaphore::new(limits.blocks_in_flight_max)),
             watchers: Arc::new(Semaphore::new(limits.watchers_max)),
-            next_link: AtomicU64::new(1),
             loopback_only: config.listen.ip().is_loopback(),
             sites,
+            gates,
             config,
             state,
             trust,
@@ -113,10 +111,6 @@ impl Door {
         let state = self.state.clone();
         let asked = tokio::task::spawn_blocking(move || Space::at(state.root()));
         asked.await.ok().flatten()
-    }
-
-    fn next_link(&self) -> LinkId {
-        LinkId(self.next_link.fetch_add(1, Ordering::Relaxed))
     }
 }
 

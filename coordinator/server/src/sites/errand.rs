@@ -1,19 +1,22 @@
-//! The thread of one site: asks the loop what is wanted and the queue what is there, and does what the pilot says.
+//! The thread of one site. In pilot mode it asks the loop what is wanted and the queue what is there, and does what the pilot says.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cluster::camp::Camp;
 use cluster::pilot::{self, Action, Pilot, Settings, Standing, Wanted};
-use cluster::{Array, ClusterError, Limits, Mode, survey};
+use cluster::survey::Program;
+use cluster::{Array, ClusterError, Limits, Mode, Site, survey};
 use model::{Epoch, Revision, Span, Timestamp};
 use sched::Offer;
+use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot};
+use tokio::time::timeout;
 
 use super::Board;
 use super::pass::Pass;
-use crate::input::{Input, Query};
+use super::poll::Poller;
+use crate::input::{Gates, Input, Query};
 
 /// The least time between two looks at the queue, however often there may be something new.
 const LOOK_LEAST: Duration = Duration::from_secs(1);
@@ -35,10 +38,19 @@ pub(crate) struct Errand {
     pub(crate) epoch: Epoch,
     pub(crate) inputs: mpsc::Sender<Input>,
     pub(crate) board: Board,
-    pub(crate) woken: Receiver<()>,
+    pub(crate) gates: Gates,
+    pub(crate) runtime: Handle,
 }
 
-/// A site that was looked at.
+/// What a site was found to be.
+enum Found {
+    /// Its workers dial.
+    Pilot(Box<Known>),
+    /// Nothing there dials.
+    Poll(Limits),
+}
+
+/// A site in pilot mode that was looked at.
 struct Known {
     pilot: Pilot,
     limits: Limits,
@@ -49,24 +61,25 @@ struct Known {
 }
 
 /// The loop has ended.
-struct Stopping;
+pub(super) struct Stopping;
 
 impl Errand {
     /// Runs until the loop has ended.
-    pub(crate) fn run(self) {
+    pub(crate) fn run(self, mut woken: mpsc::Receiver<()>) {
         let origin = Instant::now();
         let poll = Duration::from_micros(self.camp.site.poll.0);
-        let mut known: Option<Known> = None;
+        let mut known: Option<Box<Known>> = None;
         let mut failures = 0_u32;
         loop {
             let begun = Instant::now();
             let Ok(wanted) = self.wanted() else { return };
             let now = Timestamp(u64::try_from(origin.elapsed().as_micros()).unwrap_or(u64::MAX));
             let pause = match self.round(now, &mut known, wanted) {
-                Ok(()) => {
+                Ok(None) => {
                     failures = 0;
                     poll
                 }
+                Ok(Some(poller)) => return poller.run(&mut woken),
                 Err(error) => {
                     let words = words(&error);
                     tracing::warn!(site = self.camp.site.name, "{words}");
@@ -77,16 +90,17 @@ impl Errand {
                     longer.min(PAUSE_LONGEST).max(poll)
                 }
             };
-            match self.woken.recv_timeout(pause) {
-                Err(RecvTimeoutError::Disconnected) => return,
-                Err(RecvTimeoutError::Timeout) => {}
-                Ok(()) => thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
+            let woken = async { timeout(pause, woken.recv()).await };
+            match self.runtime.block_on(woken) {
+                Ok(None) => return,
+                Err(_) => {}
+                Ok(Some(())) => thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
             }
         }
     }
 
     /// What the farm wants of this site.
-    fn wanted(&self) -> Result<Wanted, Stopping> {
+    pub(super) fn wanted(&self) -> Result<Wanted, Stopping> {
         let site = &self.camp.site;
         let offer = Offer {
             revision: self.revision,
@@ -107,30 +121,31 @@ impl Errand {
         }
     }
 
+    /// One look, and what follows from it; a site that is found to be polled is so from then on.
     fn round(
         &self,
         now: Timestamp,
-        known: &mut Option<Known>,
+        known: &mut Option<Box<Known>>,
         wanted: Wanted,
-    ) -> Result<(), ClusterError> {
+    ) -> Result<Option<Poller<'_>>, ClusterError> {
         let known = match known {
             Some(known) => known,
             None => match self.look()? {
-                Some(found) => known.insert(found),
-                None => return Ok(()),
+                Found::Pilot(found) => known.insert(found),
+                Found::Poll(limits) => return Poller::new(self, limits).map(Some),
             },
         };
         // Nobody is asked about nothing.
         if wanted.squares == 0 && known.is_empty {
             known.pilot.rests();
             self.show(known.pilot.standing());
-            return Ok(());
+            return Ok(None);
         }
-        self.fly(now, known, wanted)
+        self.fly(now, known, wanted).map(|()| None)
     }
 
-    /// Looks at a site for the first time; `None` where its workers cannot dial.
-    fn look(&self) -> Result<Option<Known>, ClusterError> {
+    /// Looks at a site for the first time.
+    fn look(&self) -> Result<Found, ClusterError> {
         let site = &self.camp.site;
         let dials = match site.mode {
             Mode::Auto => survey::host(site, &self.camp.way, Some(&self.coordinator))?.dials,
@@ -139,24 +154,19 @@ impl Errand {
         let mode = survey::fitting(site, dials);
         self.board.change(&site.name, |status| {
             status.mode = mode.name().to_owned();
-            if mode == Mode::Poll {
-                status.trouble = "poll mode is not there yet, so that nothing is submitted; where its workers can dial this \
-                                  coordinator, write mode = \"pilot\""
-                    .to_owned();
-            }
         });
-        if mode == Mode::Poll {
-            return Ok(None);
-        }
         let limits = self.camp.queue.limits()?;
+        if mode == Mode::Poll {
+            return Ok(Found::Poll(limits));
+        }
         let names = format!("{}{}-", self.camp.prefix(), self.epoch.0);
         let settings = Settings::of(site, &limits, names);
-        Ok(Some(Known {
+        Ok(Found::Pilot(Box::new(Known {
             pilot: Pilot::new(settings),
             limits,
             is_empty: false,
             is_ready: false,
-        }))
+        })))
     }
 
     fn fly(&self, now: Timestamp, known: &mut Known, wanted: Wanted) -> Result<(), ClusterError> {
@@ -235,16 +245,7 @@ impl Errand {
         let (site, way) = (&self.camp.site, &self.camp.way);
         if !known.is_ready {
             let program = survey::program(site, way)?;
-            if program.revision != self.revision.0 {
-                return Err(ClusterError::Program {
-                    path: site.program.clone(),
-                    site: site.name.clone(),
-                    what: format!(
-                        "it makes pixels of renderer revision {}, and this farm those of {}",
-                        program.revision, self.revision.0
-                    ),
-                });
-            }
+            program_makes(site, &program, self.revision)?;
             known.is_ready = true;
         }
         let token = self.pass.content()?;
@@ -265,8 +266,27 @@ impl Errand {
     }
 }
 
+/// Sees that a program makes the farm's pixels.
+pub(super) fn program_makes(
+    site: &Site,
+    program: &Program,
+    revision: Revision,
+) -> Result<(), ClusterError> {
+    match program.revision == revision.0 {
+        true => Ok(()),
+        false => Err(ClusterError::Program {
+            path: site.program.clone(),
+            site: site.name.clone(),
+            what: format!(
+                "it makes pixels of renderer revision {}, and this farm those of {revision}",
+                program.revision
+            ),
+        }),
+    }
+}
+
 /// An error with its causes, and what to change.
-fn words(error: &ClusterError) -> String {
+pub(super) fn words(error: &ClusterError) -> String {
     let mut words = error.to_string();
     let mut source = std::error::Error::source(error);
     while let Some(cause) = source {
@@ -276,7 +296,7 @@ fn words(error: &ClusterError) -> String {
     format!("{words}; {}", error.next())
 }
 
-fn unix_ms() -> u64 {
+pub(super) fn unix_ms() -> u64 {
     let since = SystemTime::now().duration_since(UNIX_EPOCH);
     u64::try_from(since.unwrap_or_default().as_millis()).unwrap_or(u64::MAX)
 }

@@ -1,13 +1,14 @@
-//! Sites: a thread for each, since queues and ssh block. What it decides is `cluster::pilot`'s; here it is done.
+//! Sites: a thread for each, since queues and ssh block. What it decides is `cluster::pilot`'s or
+//! `cluster::poll`'s; here it is done.
 
 mod board;
 mod errand;
 mod pass;
+mod poll;
 
 use std::cell::RefCell;
 use std::net::SocketAddr;
 use std::sync::Arc;
-use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread;
 
 use cluster::camp::{Camp, farm_of};
@@ -15,7 +16,7 @@ use tokio::runtime::Handle;
 use tokio::sync::mpsc;
 
 use crate::config::Config;
-use crate::input::Input;
+use crate::input::{Gates, Input};
 use crate::start::StartError;
 use crate::state::State;
 use crate::trust::Trust;
@@ -28,7 +29,7 @@ use self::pass::{Pass, Token};
 #[derive(Debug)]
 pub(crate) struct Sites {
     board: Board,
-    wakes: Vec<SyncSender<()>>,
+    wakes: Vec<mpsc::Sender<()>>,
 }
 
 impl Sites {
@@ -38,7 +39,7 @@ impl Sites {
         state: &Arc<State>,
         (address, addresses): (SocketAddr, &[String]),
         trust: &Arc<Trust>,
-        inputs: &mpsc::Sender<Input>,
+        (inputs, gates): (&mpsc::Sender<Input>, &Gates),
     ) -> Result<Self, StartError> {
         let mut sites = Self {
             board: Board::new(&config.sites),
@@ -50,7 +51,7 @@ impl Sites {
         let farm = farm_of(state.root())?;
         for site in &config.sites {
             // One wake waits at most: it stands for all.
-            let (wake, woken) = sync_channel(1);
+            let (wake, woken) = mpsc::channel(1);
             let coordinator = site.coordinator.clone();
             let pass = match config.listen.ip().is_loopback() {
                 true => Pass::Owner(state.root().join(wire::place::TOKEN_FILE)),
@@ -73,11 +74,12 @@ impl Sites {
                 epoch: state.epoch(),
                 inputs: inputs.clone(),
                 board: sites.board.clone(),
-                woken,
+                gates: gates.clone(),
+                runtime: Handle::current(),
             };
             thread::Builder::new()
                 .name(format!("site {}", site.name))
-                .spawn(move || errand.run())
+                .spawn(move || errand.run(woken))
                 .map_err(StartError::Thread)?;
             sites.wakes.push(wake);
         }

@@ -1,0 +1,268 @@
+//! `flyby site-agent ls` and `get`: how everything stands, and blocks that are finished.
+//!
+//! The queue is asked before files are read: of a task that has ended all blocks are there then.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::fs::{self, File};
+use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write};
+use std::path::Path;
+
+use cluster::orders::{
+    End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Had, Look, Seen, SeenArray, SeenTask, Stands,
+    Wants, edges,
+};
+use cluster::{Task, TaskState};
+use wire::block::BlockRecord;
+use wire::spool::{self, Entry};
+
+use super::folder::{Folder, cannot};
+use super::{camp, queue};
+use crate::error::Error;
+
+/// What the queue shows of an array: its tasks by number.
+type Shown = BTreeMap<u32, Stands>;
+
+/// Answers a look on standard output.
+pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
+    let camp = camp(folder, request.there)?;
+    let shown = camp.queue.list(&camp.prefix());
+    let shown = by_array(shown.map_err(queue("cannot ask the queue"))?);
+    let known: BTreeSet<_> = request.known.iter().map(String::as_str).collect();
+    let mut arrays = Vec::new();
+    for name in names(&folder.arrays())? {
+        arrays.push(array(folder, &name, &known, shown.get(&name))?);
+    }
+    for wants in &request.wants {
+        note(folder, wants)?;
+    }
+    // What the queue has of ours that has no folder is nobody's.
+    for (name, tasks) in &shown {
+        let is_there = arrays.iter().any(|array| array.name == *name);
+        let is_live = tasks.values().any(|&stands| stands != Stands::Ended);
+        if !is_there && is_live {
+            arrays.push(SeenArray {
+                name: name.clone(),
+                is_submitted: true,
+                order: None,
+                tasks: numbered(tasks, tasks.keys().max().copied().unwrap_or(0)),
+                had: Vec::new(),
+            });
+        }
+    }
+    let seen = Seen {
+        arrays,
+        files: names(&folder.scenes())?,
+    };
+    answer(folder, &seen, &request.wants)
+        .map_err(|error| Error::failed("cannot answer").because(error))
+}
+
+fn by_array(tasks: Vec<Task>) -> BTreeMap<String, Shown> {
+    let mut arrays = BTreeMap::<String, Shown>::new();
+    for task in tasks {
+        let stands = match task.state {
+            TaskState::Waiting { .. } | TaskState::Held { .. } => Stands::Waits,
+            TaskState::Running { .. } | TaskState::Ending => Stands::Runs,
+            _ => Stands::Ended,
+        };
+        let number = task.id.task.unwrap_or(1);
+        arrays.entry(task.name).or_default().insert(number, stands);
+    }
+    arrays
+}
+
+/// Tasks in order; those that the queue shows no more have ended.
+fn numbered(shown: &Shown, count: u32) -> Vec<SeenTask> {
+    let stands = |number: u32| shown.get(&number).copied().unwrap_or(Stands::Ended);
+    (1..=count)
+        .map(|number| SeenTask(stands(number), 0))
+        .collect()
+}
+
+fn array(
+    folder: &Folder,
+    name: &str,
+    known: &BTreeSet<&str>,
+    shown: Option<&Shown>,
+) -> Result<SeenArray, Error> {
+    let order = folder.order(name).ok();
+    let count = order.as_ref().map_or(0, |order| order.tasks.len());
+    let count = u32::try_from(count).unwrap_or(u32::MAX);
+    let nothing = Shown::new();
+    let mut tasks = numbered(shown.unwrap_or(&nothing), count);
+    let place = folder.array(name)?;
+    for file in entries(&place)? {
+        let number = file.0.strip_suffix(".blocks").map(str::parse::<usize>);
+        let task = match number {
+            Some(Ok(number @ 1..)) => tasks.get_mut(number - 1),
+            _ => None,
+        };
+        if let Some(task) = task {
+            task.1 = file.1;
+        }
+    }
+    let order = order.filter(|_| !known.contains(name));
+    let had = match order {
+        Some(_) => had(folder, name)?,
+        None => Vec::new(),
+    };
+    Ok(SeenArray {
+        name: name.to_owned(),
+        is_submitted: shown.is_some() || folder.id(name)?.is_some(),
+        order,
+        tasks,
+        had,
+    })
+}
+
+/// How much of each task's file the coordinator had when it asked last.
+fn offsets(folder: &Folder, array: &str) -> Result<Vec<u64>, Error> {
+    // One that cannot be read costs no more than that blocks are fetched once more.
+    let text = fs::read(folder.had(array)?).unwrap_or_default();
+    Ok(serde_json::from_slice(&text).unwrap_or_default())
+}
+
+/// Notes what the coordinator has, for one that comes after it.
+fn note(folder: &Folder, wants: &Wants) -> Result<(), Error> {
+    let before = offsets(folder, &wants.array)?;
+    let offset = |(place, offset): (usize, &Option<u64>)| {
+        let before = before.get(place).copied().unwrap_or(0);
+        offset.unwrap_or(before)
+    };
+    let now: Vec<u64> = wants.offsets.iter().enumerate().map(offset).collect();
+    if now == before || now.iter().all(|&offset| offset == 0) {
+        return Ok(());
+    }
+    let path = folder.had(&wants.array)?;
+    // It is of use alone; an array that was removed meanwhile has no folder, and a disk that is full has no room.
+    if path.parent().is_some_and(Path::is_dir) {
+        let text = serde_json::to_vec(&now).unwrap_or_default();
+        let _ = super::folder::write(&path, &text);
+    }
+    Ok(())
+}
+
+/// What the coordinator had, block by block.
+fn had(folder: &Folder, array: &str) -> Result<Vec<Had>, Error> {
+    let mut all = Vec::new();
+    for (task, offset) in (1..).zip(offsets(folder, array)?) {
+        let path = folder.blocks(array, task)?;
+        let mut bytes = Vec::new();
+        if offset > 0 {
+            let read = File::open(&path).and_then(|file| file.take(offset).read_to_end(&mut bytes));
+            read.map_err(cannot("read", &path))?;
+        }
+        let mut had = Had(offset, Vec::new());
+        let mut rest = &bytes[..];
+        loop {
+            let length = match spool::read(rest) {
+                Entry::Block(delivery, length) => {
+                    if let Ok(record) = BlockRecord::only(&delivery.record) {
+                        had.1.push(edges(record.header.rect));
+                    }
+                    length
+                }
+                Entry::Damaged(length) => length,
+                Entry::End => break,
+            };
+            rest = &rest[length..];
+        }
+        all.push(had);
+    }
+    Ok(all)
+}
+
+/// What is in a folder, with its length. One that is gone is empty.
+fn entries(path: &Path) -> Result<Vec<(String, u64)>, Error> {
+    let read = match fs::read_dir(path) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Vec::new()),
+        read => read.map_err(cannot("read", path))?,
+    };
+    let mut entries = Vec::new();
+    for entry in read {
+        let entry = entry.map_err(cannot("read", path))?;
+        let length = entry.metadata().map_or(0, |about| about.len());
+        if let Ok(name) = entry.file_name().into_string() {
+            entries.push((name, length));
+        }
+    }
+    Ok(entries)
+}
+
+/// The names in a folder, but for those that are not in their place yet.
+fn names(path: &Path) -> Result<Vec<String>, Error> {
+    let names = entries(path)?.into_iter().map(|(name, _)| name);
+    let whole = names.filter(|name| !name.starts_with('.') && !name.contains(".part."));
+    Ok(whole.collect())
+}
+
+fn answer(folder: &Folder, seen: &Seen, wants: &[Wants]) -> io::Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    serde_json::to_writer(&mut out, seen)?;
+    out.write_all(b"\n")?;
+    let mut room = Room {
+        bytes: FETCH_BYTES_MAX,
+        blocks: FETCH_BLOCKS_MAX,
+    };
+    let mut end = End::Whole;
+    'all: for (place, wants) in (0..).zip(wants) {
+        for (task, offset) in (1..).zip(&wants.offsets) {
+            let Some(offset) = *offset else { continue };
+            let Ok(path) = folder.blocks(&wants.array, task) else {
+                continue;
+            };
+            if send(&path, offset, (place, task), &mut room, &mut out)? == End::More {
+                end = End::More;
+                break 'all;
+            }
+        }
+    }
+    out.write_all(&end.bytes())?;
+    out.flush()
+}
+
+/// How much may still be sent.
+struct Room {
+    bytes: u64,
+    blocks: u32,
+}
+
+/// Sends the whole blocks of a task's file beyond an offset, as far as there is room.
+fn send(
+    path: &Path,
+    offset: u64,
+    (array, task): (u32, u32),
+    room: &mut Room,
+    out: &mut impl Write,
+) -> io::Result<End> {
+    // One that has written nothing has no file.
+    let Ok(mut file) = File::open(path) else {
+        return Ok(End::Whole);
+    };
+    let length = file.metadata()?.len();
+    if length <= offset {
+        return Ok(End::Whole);
+    }
+    file.seek(SeekFrom::Start(offset))?;
+    let mut bytes = Vec::new();
+    file.take(room.bytes).read_to_end(&mut bytes)?;
+    let (mut rest, mut at) = (&bytes[..], offset);
+    while let Some(length) = spool::length(rest) {
+        if room.blocks == 0 {
+            return Ok(End::More);
+        }
+        let (entry, after) = rest.split_at(length);
+        at += length as u64;
+        let head = Frame::head(array, task, at, u32::try_from(length).unwrap_or(u32::MAX));
+        out.write_all(&head)?;
+        out.write_all(entry)?;
+        room.bytes -= length as u64;
+        room.blocks -= 1;
+        rest = after;
+    }
+    // What was read ends where the room did.
+    Ok(match offset + (bytes.len() as u64) < length {
+        true => End::More,
+        false => End::Whole,
+    })
+}

@@ -1,0 +1,629 @@
+//! Poll mode: which arrays a site should have, and what of them is wanted, decided from what was leased and what was seen
+//! there. A function of its state and an observation; whoever drives it asks the agent at the site, and does what it says.
+//!
+//! What always holds: a tile is in at most one array; nothing ends unnoticed, since a task that will not go on and has
+//! not brought all its blocks gives its tile back, so that the rest is leased anew (thesis §C.5); after three tries
+//! without a block a tile fails; after a refusal nothing is submitted for a while, longer each time.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use model::{AttemptId, Begun, Digest, ImageRef, Lease, Rect, Revision, Running, Span, Timestamp};
+
+use crate::orders::{Had, Order, Seen, SeenArray, Stands, TaskOrder, Wants};
+use crate::queue::Limits;
+use crate::sites::{Kind, Site};
+
+/// Tasks of an array where neither the site nor its queue says how many there may be.
+pub const ARRAY_TASKS: u32 = 1_000;
+
+/// Tries in a row that brought no block, after which a tile fails.
+const TRIES_MAX: u32 = 3;
+
+/// Images beyond those that the site's `ahead` asks for, at most.
+const RAISED_MAX: u32 = 63;
+
+/// A task asks for so many times what it is expected to take…
+const LIMIT_FACTOR: u64 = 4;
+
+/// …and so much for its start, and never for less than…
+const LIMIT_START: Span = Span::from_secs(60);
+
+/// …this.
+const LIMIT_LEAST: Span = Span::from_secs(120);
+
+/// What became of a tile is forgotten so many observations after it was last leased.
+const REMEMBERED: u64 = 1_000;
+
+/// How long nothing is submitted after the first refusal; twice as long after each further one…
+const PAUSE_FIRST: Span = Span::from_secs(10);
+
+/// …and never longer than this.
+const PAUSE_LONGEST: Span = Span::from_secs(900);
+
+/// What does not change while a coordinator runs.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub struct Settings {
+    /// What names of arrays begin with; a number follows. It differs from start to start, so that no name comes twice.
+    pub names: String,
+    /// The renderer's revision.
+    pub revision: Revision,
+    /// Render threads of a task.
+    pub threads: u32,
+    /// Most tasks of an array that run at a time, where the queue does not see to that.
+    pub running_max: Option<u32>,
+    /// Most tasks of an array.
+    pub array_max: u32,
+    /// Images that wait beyond the one that runs (thesis §C.3.5).
+    pub ahead: u32,
+    /// How long a task may run, by the site's word.
+    pub time_limit: Option<Span>,
+    /// The queue's own limit.
+    pub time_max: Option<Span>,
+}
+
+impl Settings {
+    /// Those of a site, by what it and its queue say.
+    pub fn of(site: &Site, limits: &Limits, names: String, revision: Revision) -> Self {
+        let array_max = [site.max_array_size, limits.array_tasks];
+        let processors = limits
+            .slots
+            .map(|(_, all)| (all / site.threads.max(1)).max(1));
+        Self {
+            names,
+            revision,
+            threads: site.threads,
+            running_max: match site.kind {
+                Kind::Slurm | Kind::GridEngine => site.max_running,
+                Kind::Ssh | Kind::Local => site.max_running.or(processors),
+            },
+            array_max: array_max.into_iter().flatten().min().unwrap_or(ARRAY_TASKS),
+            ahead: site.ahead,
+            time_limit: site.time_limit,
+            time_max: limits.time,
+        }
+    }
+}
+
+/// What to do now, in this order.
+#[derive(Clone, PartialEq, Eq, Debug)]
+pub enum Action {
+    /// End these, by the array's name.
+    Delete(Vec<(String, Option<u32>)>),
+    /// Remove the folders of these arrays.
+    Remove(Vec<String>),
+    /// Give these tiles back: their tasks ended before they were done.
+    GiveBack(Vec<AttemptId>),
+    /// A tile came to nothing several times: the log of this task may say why.
+    Fail {
+        /// The tile.
+        attempt: AttemptId,
+        /// Its array.
+        array: String,
+        /// Its task.
+        task: u32,
+    },
+    /// Submit an array; where that fails say so: [`Poll::refused`].
+    Submit(Order),
+}
+
+/// How a site stands, for people.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Standing {
+    /// Tasks that wait in the queue.
+    pub waiting: u32,
+    /// Tasks that run.
+    pub running: u32,
+    /// What is wrong, and what to do; nothing where nothing is.
+    pub trouble: Option<String>,
+}
+
+/// The state of one site.
+#[derive(Clone, Debug)]
+pub struct Poll {
+    settings: Settings,
+    number: u64,
+    observations: u64,
+    tiles: BTreeMap<AttemptId, Tile>,
+    arrays: BTreeMap<String, Array>,
+    histories: BTreeMap<(ImageRef, Rect), History>,
+    raised: u32,
+    /// Images of which the last block arrived since the last observation.
+    finished: u32,
+    failures: u32,
+    quiet_until: Timestamp,
+    standing: Standing,
+}
+
+/// A tile that is leased to the site.
+#[derive(Clone, Debug)]
+struct Tile {
+    lease: Lease,
+    missing: BTreeSet<Rect>,
+    /// Blocks that have arrived, those that an earlier coordinator had among them.
+    arrived: u32,
+    inherited: u32,
+    /// How long they took one thread.
+    took: Span,
+    /// Bytes of its file that are done with.
+    offset: u64,
+    runs: bool,
+    place: Option<(String, u32)>,
+}
+
+/// An array that is there, or may be.
+#[derive(Clone, Debug)]
+struct Array {
+    /// The tile of each task, as long as it is wanted.
+    tiles: Vec<Option<AttemptId>>,
+    /// Whether it is known that it was submitted.
+    is_sure: bool,
+    time_limit: Option<Span>,
+    /// Tasks that were deleted from here.
+    deleted: BTreeSet<u32>,
+}
+
+/// What became of a tile before.
+#[derive(Clone, Copy, Debug, Default)]
+struct History {
+    /// Tries in a row that brought nothing.
+    tries: u32,
+    /// What one block takes one thread.
+    block: Span,
+    /// The last limit.
+    limit: Option<Span>,
+    /// When it was last of use.
+    observation: u64,
+}
+
+impl Poll {
+    /// A site that holds nothing.
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings,
+            number: 0,
+            observations: 0,
+            tiles: BTreeMap::new(),
+            arrays: BTreeMap::new(),
+            histories: BTreeMap::new(),
+            raised: 0,
+            finished: 0,
+            failures: 0,
+            quiet_until: Timestamp(0),
+            standing: Standing::default(),
+        }
+    }
+
+    /// How it stands.
+    pub fn standing(&self) -> &Standing {
+        &self.standing
+    }
+
+    /// Images that the site should hold.
+    pub fn credit(&self) -> u32 {
+        1 + self
+            .settings
+            .ahead
+            .saturating_add(self.raised)
+            .min(RAISED_MAX)
+    }
+
+    /// Whether there is anything at the site, or should be.
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty() && self.arrays.is_empty()
+    }
+
+    /// The scenes of what is leased.
+    pub fn scenes(&self) -> BTreeSet<Digest> {
+        self.tiles.values().map(|tile| tile.lease.scene).collect()
+    }
+
+    /// The tiles that are held, for whoever connects anew.
+    pub fn held(&self) -> Vec<AttemptId> {
+        self.tiles.keys().copied().collect()
+    }
+
+    /// The tiles that run, and how far they are.
+    pub fn running(&self) -> Vec<Running> {
+        let tiles = self.tiles.iter().filter(|(_, tile)| tile.runs);
+        tiles
+            .map(|(&attempt, tile)| Running {
+                attempt,
+                blocks: tile.arrived,
+            })
+            .collect()
+    }
+
+    /// A tile is leased to the site.
+    pub fn leased(&mut self, lease: Lease) {
+        self.tiles
+            .entry(lease.attempt)
+            .or_insert_with(|| Tile::new(lease, None));
+    }
+
+    /// Nobody wants a tile any more.
+    pub fn revoked(&mut self, attempt: AttemptId) {
+        self.forget(attempt);
+    }
+
+    /// Only these tiles are still the site's.
+    pub fn keeps(&mut self, live: &[AttemptId]) {
+        let live: BTreeSet<_> = live.iter().collect();
+        let gone: Vec<_> = self.tiles.keys().copied().collect();
+        for attempt in gone.into_iter().filter(|attempt| !live.contains(attempt)) {
+            self.forget(attempt);
+        }
+    }
+
+    /// Takes up what an earlier coordinator left there: what runs, and what has ended and may have brought blocks that
+    /// nobody has fetched. What only waits is not taken up, and so deleted.
+    pub fn takes_up(&mut self, seen: &Seen) -> Vec<Begun> {
+        let mut begun = Vec::new();
+        for array in &seen.arrays {
+            let Some(order) = array.order.as_ref().filter(|_| array.is_submitted) else {
+                continue;
+            };
+            if self.arrays.contains_key(&array.name) {
+                continue;
+            }
+            let mut tiles = vec![None; order.tasks.len()];
+            for (index, (task, tile)) in array.tasks.iter().zip(&mut tiles).enumerate() {
+                let number = u32::try_from(index + 1).unwrap_or(u32::MAX);
+                let has_begun = task.0 != Stands::Waits && (task.0 == Stands::Runs || task.1 > 0);
+                let Some(lease) = order.lease(number).filter(|_| has_begun) else {
+                    continue;
+                };
+                *tile = Some(lease.attempt);
+                let claim = Begun {
+                    attempt: lease.attempt,
+                    image: lease.image,
+                    tile: lease.tile,
+                };
+                let place = (array.name.clone(), number);
+                let mut taken = Tile::new(lease, Some(place));
+                if let Some(had) = array.had.get(index) {
+                    taken.inherits(had);
+                }
+                // Of one that is whole nothing more is wanted.
+                if taken.missing.is_empty() {
+                    *tile = None;
+                    continue;
+                }
+                begun.push(claim);
+                self.tiles.insert(claim.attempt, taken);
+            }
+            let found = Array {
+                tiles,
+                is_sure: true,
+                time_limit: order.time_limit,
+                deleted: BTreeSet::new(),
+            };
+            self.arrays.insert(array.name.clone(), found);
+        }
+        begun
+    }
+
+    /// Arrays whose orders are known.
+    pub fn known(&self) -> Vec<String> {
+        self.arrays.keys().cloned().collect()
+    }
+
+    /// What is wanted of the arrays.
+    pub fn wants(&self) -> Vec<Wants> {
+        let offset = |attempt: &Option<AttemptId>| {
+            let tile = self.tiles.get(attempt.as_ref()?)?;
+            Some(tile.offset)
+        };
+        let wants = self.arrays.iter().map(|(name, array)| Wants {
+            array: name.clone(),
+            offsets: array.tiles.iter().map(offset).collect(),
+        });
+        wants
+            .filter(|wants| wants.offsets.iter().any(Option::is_some))
+            .collect()
+    }
+
+    /// Of a task's file all bytes before `end` are done with.
+    pub fn is_done_to(&mut self, array: &str, task: u32, end: u64) {
+        let attempt = self.arrays.get(array).and_then(|array| array.attempt(task));
+        if let Some(tile) = attempt.and_then(|attempt| self.tiles.get_mut(&attempt)) {
+            tile.offset = tile.offset.max(end);
+        }
+    }
+
+    /// A block is durable.
+    pub fn delivered(&mut self, attempt: AttemptId, block: Rect, took: Span) {
+        let Some(tile) = self.tiles.get_mut(&attempt) else {
+            return;
+        };
+        if !tile.missing.remove(&block) {
+            return;
+        }
+        tile.arrived += 1;
+        tile.took = tile.took + took;
+        if tile.missing.is_empty() {
+            let image = tile.lease.image;
+            let key = (image, tile.lease.tile);
+            self.histories.remove(&key);
+            self.forget(attempt);
+            if !self.tiles.values().any(|tile| tile.lease.image == image) {
+                self.finished += 1;
+            }
+        }
+    }
+
+    /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do.
+    pub fn observe(&mut self, now: Timestamp, seen: &Seen) -> Vec<Action> {
+        self.observations += 1;
+        let mut actions = Vec::new();
+        let by_name: BTreeMap<_, _> = seen
+            .arrays
+            .iter()
+            .map(|array| (array.name.as_str(), array))
+            .collect();
+        self.follow(&by_name, &mut actions);
+        self.tidy(&by_name, &mut actions);
+        // The stock did not last from one look to the next (thesis §C.3.5).
+        if self.finished >= self.credit() && self.raised < RAISED_MAX {
+            self.raised += 1;
+        }
+        self.finished = 0;
+        let (now_is, kept) = (self.observations, REMEMBERED);
+        self.histories
+            .retain(|_, history| history.observation + kept > now_is);
+        if now >= self.quiet_until {
+            self.submit(&mut actions);
+        }
+        actions
+    }
+
+    /// An array could not be submitted, or may have been: the next look says.
+    pub fn refused(&mut self, now: Timestamp, array: &str, words: String) {
+        if let Some(array) = self.arrays.get_mut(array) {
+            array.is_sure = false;
+        }
+        let pause = PAUSE_FIRST.times(1 << self.failures.min(16));
+        self.failures += 1;
+        self.quiet_until = now + pause.min(PAUSE_LONGEST);
+        self.standing.trouble = Some(words);
+    }
+
+    /// An array was submitted.
+    pub fn submitted(&mut self) {
+        self.failures = 0;
+        self.standing.trouble = None;
+    }
+
+    /// Finds out how each tile's task stands; what ended too early goes back.
+    fn follow(&mut self, seen: &BTreeMap<&str, &SeenArray>, actions: &mut Vec<Action>) {
+        let mut ended = Vec::new();
+        for (&attempt, tile) in &mut self.tiles {
+            let Some((name, task)) = tile.place.clone() else {
+                continue;
+            };
+            let there = seen.get(name.as_str()).filter(|there| there.is_submitted);
+            let array = self.arrays.get_mut(&name);
+            let array = array.filter(|array| there.is_none() && !array.is_sure);
+            match (there.map(|there| stands(there, task)), array) {
+                // It never came there.
+                (_, Some(array)) => {
+                    if let Some(place) = array.place(task) {
+                        array.tiles[place] = None;
+                    }
+                    tile.place = None;
+                }
+                (None | Some(Stands::Ended), None) => ended.push((attempt, name, task)),
+                (Some(stands), None) => tile.runs = stands == Stands::Runs,
+            }
+        }
+        let mut back = Vec::new();
+        for (attempt, array, task) in ended {
+            let Some(tile) = self.forget(attempt) else {
+                continue;
+            };
+            let key = (tile.lease.image, tile.lease.tile);
+            let history = self.histories.entry(key).or_default();
+            history.observation = self.observations;
+            history.limit = self.arrays.get(&array).and_then(|array| array.time_limit);
+            match tile.arrived - tile.inherited {
+                0 => history.tries += 1,
+                blocks => {
+                    history.tries = 0;
+                    history.block = Span(tile.took.0 / u64::from(blocks));
+                }
+            }
+            match history.tries >= TRIES_MAX {
+                true => {
+                    self.histories.remove(&key);
+                    actions.push(Action::Fail {
+                        attempt,
+                        array,
+                        task,
+                    });
+                }
+                false => back.push(attempt),
+            }
+        }
+        if !back.is_empty() {
+            actions.push(Action::GiveBack(back));
+        }
+    }
+
+    /// Ends and removes what nobody needs, and counts what is live.
+    fn tidy(&mut self, seen: &BTreeMap<&str, &SeenArray>, actions: &mut Vec<Action>) {
+        let (mut delete, mut remove) = (Vec::new(), Vec::new());
+        let (mut waiting, mut running) = (0, 0);
+        for (&name, there) in seen {
+            waiting += count(there, Stands::Waits);
+            running += count(there, Stands::Runs);
+            let array = self.arrays.entry(name.to_owned()).or_insert_with(|| Array {
+                // What nobody knows, nobody wants.
+                tiles: vec![None; there.tasks.len()],
+                is_sure: true,
+                time_limit: None,
+                deleted: BTreeSet::new(),
+            });
+            array.is_sure |= there.is_submitted;
+            let is_wanted = array.tiles.iter().any(Option::is_some);
+            let live = (1..)
+                .zip(&there.tasks)
+                .filter(|(_, task)| task.0 != Stands::Ended);
+            let live: Vec<u32> = live.map(|(number, _)| number).collect();
+            match (is_wanted, live.is_empty()) {
+                (false, true) => remove.push(name.to_owned()),
+                (false, false) => delete.push((name.to_owned(), None)),
+                (true, _) => {
+                    for task in live {
+                        if array.attempt(task).is_none() && array.deleted.insert(task) {
+                            delete.push((name.to_owned(), Some(task)));
+                        }
+                    }
+                }
+            }
+        }
+        self.arrays
+            .retain(|name, _| seen.contains_key(name.as_str()));
+        self.standing.waiting = waiting;
+        self.standing.running = running;
+        if !delete.is_empty() {
+            actions.push(Action::Delete(delete));
+        }
+        if !remove.is_empty() {
+            actions.push(Action::Remove(remove));
+        }
+    }
+
+    /// Puts what is leased and in no array into new ones, an image into as few as it takes.
+    fn submit(&mut self, actions: &mut Vec<Action>) {
+        let mut images = BTreeMap::<(ImageRef, Digest), Vec<AttemptId>>::new();
+        for (&attempt, tile) in self.tiles.iter().filter(|(_, tile)| tile.place.is_none()) {
+            let key = (tile.lease.image, tile.lease.scene);
+            images.entry(key).or_default().push(attempt);
+        }
+        let array_max = usize::try_from(self.settings.array_max).unwrap_or(usize::MAX);
+        for ((image, scene), attempts) in images {
+            for attempts in attempts.chunks(array_max.max(1)) {
+                self.number += 1;
+                let name = format!("{}{}", self.settings.names, self.number);
+                let time_limit = self.limit(attempts);
+                let mut tasks = Vec::new();
+                for (number, attempt) in (1..).zip(attempts) {
+                    if let Some(tile) = self.tiles.get_mut(attempt) {
+                        tile.place = Some((name.clone(), number));
+                        tile.runs = false;
+                        tasks.push(TaskOrder::from(&tile.lease));
+                    }
+                }
+                let array = Array {
+                    tiles: attempts.iter().copied().map(Some).collect(),
+                    is_sure: true,
+                    time_limit,
+                    deleted: BTreeSet::new(),
+                };
+                self.arrays.insert(name.clone(), array);
+                actions.push(Action::Submit(Order {
+                    name,
+                    scene: scene.to_string(),
+                    job: image.job.0,
+                    image: image.image.0,
+                    revision: self.settings.revision.0,
+                    threads: self.settings.threads,
+                    running_max: self.settings.running_max,
+                    time_limit,
+                    tasks,
+                }));
+            }
+        }
+    }
+
+    /// How long a task of these tiles may run: by the site's word, else by what is known of the dearest.
+    fn limit(&self, attempts: &[AttemptId]) -> Option<Span> {
+        let threads = u64::from(self.settings.threads.max(1));
+        let tiles = attempts
+            .iter()
+            .filter_map(|attempt| self.tiles.get(attempt));
+        let one = |tile: &Tile| {
+            let history = self.histories.get(&(tile.lease.image, tile.lease.tile));
+            let measured = history.map_or(Span(0), |history| history.block);
+            let expected = match measured {
+                Span(0) => tile.lease.expected,
+                block => block.times(tile.missing.len() as u64),
+            };
+            let enough = Span(expected.0 / threads).times(LIMIT_FACTOR) + LIMIT_START;
+            let enough = (expected > Span(0)).then_some(enough.max(LIMIT_LEAST));
+            // What was killed without a block needs more than it had.
+            let last = history.filter(|history| history.tries > 0);
+            let longer = last
+                .and_then(|history| history.limit)
+                .map(|limit| limit.times(2));
+            enough.max(longer)
+        };
+        let limit = self
+            .settings
+            .time_limit
+            .or_else(|| tiles.filter_map(one).max())?;
+        Some(self.settings.time_max.map_or(limit, |most| limit.min(most)))
+    }
+
+    /// A tile is the site's no more.
+    fn forget(&mut self, attempt: AttemptId) -> Option<Tile> {
+        let tile = self.tiles.remove(&attempt)?;
+        if let Some((name, task)) = &tile.place
+            && let Some(array) = self.arrays.get_mut(name)
+            && let Some(place) = array.place(*task)
+        {
+            array.tiles[place] = None;
+        }
+        Some(tile)
+    }
+}
+
+impl Tile {
+    fn new(lease: Lease, place: Option<(String, u32)>) -> Self {
+        Self {
+            missing: lease.blocks().collect(),
+            lease,
+            arrived: 0,
+            inherited: 0,
+            took: Span(0),
+            offset: 0,
+            runs: false,
+            place,
+        }
+    }
+
+    /// An earlier coordinator had this of it already.
+    fn inherits(&mut self, had: &Had) {
+        self.offset = had.0;
+        for block in had.blocks() {
+            self.inherited += u32::from(self.missing.remove(&block));
+        }
+        self.arrived = self.inherited;
+    }
+}
+
+impl Array {
+    fn place(&self, task: u32) -> Option<usize> {
+        let place = usize::try_from(task.checked_sub(1)?).ok()?;
+        (place < self.tiles.len()).then_some(place)
+    }
+
+    fn attempt(&self, task: u32) -> Option<AttemptId> {
+        self.tiles[self.place(task)?]
+    }
+}
+
+fn stands(array: &SeenArray, task: u32) -> Stands {
+    let place = task
+        .checked_sub(1)
+        .and_then(|place| usize::try_from(place).ok());
+    let task = place.and_then(|place| array.tasks.get(place));
+    task.map_or(Stands::Ended, |task| task.0)
+}
+
+fn count(array: &SeenArray, stands: Stands) -> u32 {
+    let tasks = array.tasks.iter().filter(|task| task.0 == stands);
+    u32::try_from(tasks.count()).unwrap_or(u32::MAX)
+}

@@ -1,0 +1,437 @@
+//! Poll mode (thesis §C.3.4 and §C.3.5): to the loop a site is one worker that takes whole images; there they are arrays,
+//! which are asked after again and again. What is done is `cluster::poll`'s decision.
+
+mod desk;
+mod line;
+mod scenes;
+
+use std::collections::BTreeSet;
+use std::time::{Duration, Instant};
+
+use cluster::orders::{End, Order, Seen};
+use cluster::poll::{Action, Poll, Settings};
+use cluster::{ClusterError, Limits, survey};
+use model::{AttemptId, Lease, Span, Timestamp, WorkerId};
+use sched::{Event, Queue};
+use tokio::sync::mpsc;
+use wire::proto::control_down::Message;
+
+use self::desk::{Desk, Looked};
+use self::line::{Became, Cut, Hello, Line};
+use self::scenes::Scenes;
+use super::errand::{Errand, Stopping, program_makes, unix_ms, words};
+use crate::input::AboutWorker;
+
+/// After so many looks in a row that failed, others may have the site's tiles.
+const MISSED_MAX: u32 = 4;
+
+/// The longest pause after a site could not be reached several times in a row.
+const PAUSE_LONGEST: Duration = Duration::from_secs(300);
+
+/// The least time between two looks, however often there may be something new.
+const LOOK_LEAST: Duration = Duration::from_secs(1);
+
+/// How late what is heard of a task may be, beside two polls: file systems of clusters tell a login node late.
+const SLACK: Span = Span::from_secs(60);
+
+/// Most threads that are told to the scheduler.
+const THREADS_MAX: u32 = 4_096;
+
+/// Why a round ended early.
+enum Trouble {
+    Site(ClusterError),
+    Line(Cut),
+}
+
+impl From<ClusterError> for Trouble {
+    fn from(error: ClusterError) -> Self {
+        Self::Site(error)
+    }
+}
+
+impl From<Cut> for Trouble {
+    fn from(cut: Cut) -> Self {
+        Self::Line(cut)
+    }
+}
+
+impl From<Stopping> for Trouble {
+    fn from(_: Stopping) -> Self {
+        Self::Line(Cut::Stopping)
+    }
+}
+
+/// A site that is polled.
+pub(super) struct Poller<'a> {
+    errand: &'a Errand,
+    desk: Desk<'a>,
+    limits: Limits,
+    poll: Poll,
+    scenes: Scenes,
+    line: Option<Line>,
+    credit: u32,
+    /// Whether it was told to leave.
+    is_leaving: bool,
+    /// Whether the program was seen to be the right one.
+    is_ready: bool,
+    origin: Instant,
+}
+
+impl<'a> Poller<'a> {
+    pub(super) fn new(errand: &'a Errand, limits: Limits) -> Result<Self, ClusterError> {
+        let camp = &errand.camp;
+        let names = format!("{}{}-", camp.prefix(), errand.epoch.0);
+        let settings = Settings::of(&camp.site, &limits, names, errand.revision);
+        Ok(Self {
+            desk: Desk::new(camp)?,
+            poll: Poll::new(settings),
+            limits,
+            scenes: Scenes::default(),
+            line: None,
+            credit: 0,
+            is_leaving: false,
+            is_ready: false,
+            origin: Instant::now(),
+            errand,
+        })
+    }
+
+    /// Runs until the loop has ended, or the site was told to leave and has.
+    pub(super) fn run(mut self, woken: &mut mpsc::Receiver<()>) {
+        let poll = Duration::from_micros(self.errand.camp.site.poll.0);
+        let mut missed = 0_u32;
+        loop {
+            let begun = Instant::now();
+            let pause = match self.round() {
+                Ok(()) => {
+                    missed = 0;
+                    poll
+                }
+                Err(Trouble::Line(Cut::Stopping)) => return,
+                Err(Trouble::Line(Cut::Ended(why))) => {
+                    tracing::warn!(site = self.name(), why, "the site's line was ended");
+                    self.line = None;
+                    self.show(Some(why));
+                    poll
+                }
+                Err(Trouble::Site(error)) => {
+                    let words = words(&error);
+                    tracing::warn!(site = self.name(), "{words}");
+                    self.show(Some(words));
+                    missed = missed.saturating_add(1);
+                    if missed == MISSED_MAX
+                        && let Some(line) = self.line.take()
+                    {
+                        line.close();
+                    }
+                    let longer = poll.saturating_mul(1 << missed.min(8));
+                    longer.min(PAUSE_LONGEST).max(poll)
+                }
+            };
+            if self.is_leaving && self.poll.is_empty() {
+                if let Some(line) = self.line.take() {
+                    let worker = line.worker();
+                    let _ = line.say(Event::Goodbye { worker });
+                }
+                self.show(Some("it was told to leave, and has".to_owned()));
+                return;
+            }
+            match self.wait(pause, woken) {
+                Ok(true) => std::thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
+                Ok(false) => {}
+                Err(Cut::Stopping) => return,
+                Err(Cut::Ended(_)) => self.line = None,
+            }
+        }
+    }
+
+    fn name(&self) -> &str {
+        &self.errand.camp.site.name
+    }
+
+    fn now(&self) -> Timestamp {
+        Timestamp(u64::try_from(self.origin.elapsed().as_micros()).unwrap_or(u64::MAX))
+    }
+
+    /// Waits for the next look; whether somebody asked for it before its time.
+    fn wait(&mut self, pause: Duration, woken: &mut mpsc::Receiver<()>) -> Result<bool, Cut> {
+        let runtime = self.errand.runtime.clone();
+        let line = self.line.as_mut();
+        let heard = runtime.block_on(async {
+            let hear = async {
+                match line {
+                    Some(line) => line.hear().await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                () = tokio::time::sleep(pause) => Ok(None),
+                awake = woken.recv() => match awake {
+                    Some(()) => Ok(Some(None)),
+                    None => Err(Cut::Stopping),
+                },
+                heard = hear => heard.map(Some),
+            }
+        })?;
+        if let Some(Some(message)) = heard.clone() {
+            self.take(message);
+        }
+        Ok(heard.is_some())
+    }
+
+    /// One look, and what follows from it.
+    fn round(&mut self) -> Result<(), Trouble> {
+        if self.line.is_none() {
+            self.connect()?;
+        }
+        self.hear()?;
+        // Nobody is asked about nothing.
+        if self.poll.is_empty() && self.scenes.is_empty() {
+            return Ok(());
+        }
+        let seen = self.fetch()?;
+        // What was leased because of that.
+        self.hear()?;
+        let now = self.now();
+        let actions = self.poll.observe(now, &seen);
+        // What is given back may come again at once.
+        let comes_again = |action: &Action| matches!(action, Action::GiveBack(_));
+        let may_tidy = !actions.iter().any(comes_again);
+        for action in actions {
+            self.perform(action)?;
+        }
+        self.scenes.are(&seen.files);
+        if may_tidy {
+            self.tidy()?;
+        }
+        if let Some(line) = &self.line {
+            line.runs(self.poll.running());
+        }
+        self.wants()?;
+        self.show(None);
+        let asked = unix_ms();
+        let board = &self.errand.board;
+        board.change(self.name(), |site| site.asked_unix_ms = asked);
+        Ok(())
+    }
+
+    /// Joins the farm, with what the site still has of before.
+    fn connect(&mut self) -> Result<(), Trouble> {
+        let site = &self.errand.camp.site;
+        let found = self.desk.look(&self.poll)?;
+        found.end?;
+        let begun = found.seen.as_ref().map_or_else(Vec::new, |seen| {
+            self.scenes.are(&seen.files);
+            self.poll.takes_up(seen)
+        });
+        let slots = [
+            site.max_running,
+            self.limits.running,
+            self.limits.slots.map(|(_, all)| all),
+        ];
+        let slots = slots.into_iter().flatten().min().unwrap_or(1);
+        let array_max = [site.max_array_size, self.limits.array_tasks];
+        let array_max = array_max.into_iter().flatten().min();
+        let hello = Hello {
+            worker: self.worker(),
+            revision: self.errand.revision,
+            threads: slots.saturating_mul(site.threads).clamp(1, THREADS_MAX),
+            queue: Queue {
+                min_tile_pixels: site.min_tile_pixels,
+                max_array_size: array_max.map_or(cluster::poll::ARRAY_TASKS.into(), u64::from),
+                lag: site.poll.times(2) + SLACK,
+            },
+            about: AboutWorker {
+                name: site.label(),
+                build: String::new(),
+                simd_level: String::new(),
+                memory_bytes: site.memory_bytes.unwrap_or(0),
+                labels: site.labels.iter().cloned().chain([site.label()]).collect(),
+                time_left: None,
+            },
+            held: self.poll.held(),
+            begun,
+        };
+        let (inputs, gates) = (self.errand.inputs.clone(), self.errand.gates.clone());
+        let (line, live) = Line::open(hello, inputs, gates, self.errand.runtime.clone())?;
+        self.poll.keeps(&live);
+        self.line = Some(line);
+        self.credit = 0;
+        self.wants()
+    }
+
+    /// The same process for as long as this coordinator runs.
+    fn worker(&self) -> WorkerId {
+        let digest = blake3::hash(self.errand.camp.prefix().as_bytes());
+        let mut id = [0; 8];
+        id.copy_from_slice(&digest.as_bytes()[..8]);
+        WorkerId {
+            id: u64::from_le_bytes(id),
+            incarnation: self.errand.epoch.0,
+        }
+    }
+
+    /// Says how many images it wants, where that has changed.
+    fn wants(&mut self) -> Result<(), Trouble> {
+        let credit = match self.is_leaving {
+            true => 0,
+            false => self.poll.credit(),
+        };
+        if credit != self.credit
+            && let Some(line) = &self.line
+        {
+            let worker = line.worker();
+            line.say(Event::Credit { worker, credit })?;
+            self.credit = credit;
+        }
+        Ok(())
+    }
+
+    /// Hears all that was said until now: what the loop leases at a time comes whole.
+    fn hear(&mut self) -> Result<(), Trouble> {
+        // The loop answers after all that it did before.
+        self.errand.wanted()?;
+        while let Some(line) = &mut self.line {
+            match line.heard()? {
+                Some(message) => self.take(message),
+                None => break,
+            }
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, message: Message) {
+        match message {
+            Message::Lease(lease) => match Lease::try_from(lease) {
+                Ok(lease) => self.poll.leased(lease),
+                Err(bad) => tracing::error!(site = self.name(), %bad, "a lease cannot be read"),
+            },
+            Message::Revoke(revoke) => {
+                if let Some(Ok(attempt)) = revoke.attempt.map(AttemptId::try_from) {
+                    self.poll.revoked(attempt);
+                }
+            }
+            Message::Drain(_) => self.is_leaving = true,
+            Message::Welcome(_) => {}
+        }
+    }
+
+    /// Looks, and fetches all blocks that are there; answers how everything stood before the last call.
+    fn fetch(&mut self) -> Result<Seen, Trouble> {
+        loop {
+            let Looked { seen, blocks, end } = self.desk.look(&self.poll)?;
+            let mut deliveries = Vec::new();
+            for block in &blocks {
+                deliveries.extend(block.delivery.clone());
+            }
+            if let Some(line) = &mut self.line {
+                for (attempt, rect, took, became) in line.deliver(&deliveries)? {
+                    if became == Became::Durable {
+                        self.poll.delivered(attempt, rect, took);
+                    }
+                }
+            }
+            // Only now: all before these is durable, or nobody wants it.
+            for block in &blocks {
+                self.poll.is_done_to(&block.array, block.task, block.end);
+            }
+            match (end?, seen) {
+                (End::Whole, Some(seen)) => return Ok(seen),
+                // Others must not wait for what may take long.
+                _ => self.hear()?,
+            }
+        }
+    }
+
+    fn perform(&mut self, action: Action) -> Result<(), Trouble> {
+        match action {
+            Action::Delete(tasks) => self.desk.delete(tasks)?,
+            Action::Remove(arrays) => self.desk.remove(arrays, BTreeSet::new())?,
+            Action::GiveBack(attempts) => {
+                tracing::info!(
+                    site = self.name(),
+                    count = attempts.len(),
+                    "tasks ended before their tiles were done: the rest is submitted again"
+                );
+                if let Some(line) = &self.line {
+                    let worker = line.worker();
+                    line.say(Event::GivenBack { worker, attempts })?;
+                }
+            }
+            Action::Fail {
+                attempt,
+                array,
+                task,
+            } => {
+                let said = self.errand.camp.said(&array, task).unwrap_or_default();
+                let reason = format!(
+                    "at site {} its task ended several times without a block: {said}",
+                    self.name()
+                );
+                if let Some(line) = &self.line {
+                    let worker = line.worker();
+                    line.say(Event::TileFailed {
+                        worker,
+                        attempt,
+                        reason: wire::convert::sentence(&reason, 2_000),
+                    })?;
+                }
+            }
+            Action::Submit(order) => self.submit(&order)?,
+        }
+        Ok(())
+    }
+
+    fn submit(&mut self, order: &Order) -> Result<(), Trouble> {
+        let (name, tasks) = (&order.name, order.tasks.len());
+        match self.bring(order) {
+            Ok(id) => {
+                tracing::info!(site = self.name(), id, name, tasks, "an array is submitted");
+                self.poll.submitted();
+            }
+            Err(Trouble::Site(error)) => {
+                let words = words(&error);
+                tracing::warn!(site = self.name(), name, tasks, "{words}");
+                self.is_ready = false;
+                let now = self.now();
+                self.poll.refused(now, name, words);
+            }
+            Err(line) => return Err(line),
+        }
+        Ok(())
+    }
+
+    /// Sees once that the program there makes the same pixels; brings the scene where it is not there, and the order.
+    fn bring(&mut self, order: &Order) -> Result<String, Trouble> {
+        let camp = &self.errand.camp;
+        if !self.is_ready {
+            let program = survey::program(&camp.site, &camp.way)?;
+            program_makes(&camp.site, &program, self.errand.revision)?;
+            self.is_ready = true;
+        }
+        self.scenes.bring(self.errand, &order.scene)?;
+        Ok(self.desk.submit(order)?)
+    }
+
+    /// Removes scenes that nothing there needs.
+    fn tidy(&mut self) -> Result<(), Trouble> {
+        let unneeded = self.scenes.unneeded(&self.poll.scenes());
+        if !unneeded.is_empty() {
+            self.desk.remove(Vec::new(), unneeded.clone())?;
+            self.scenes.are_gone(&unneeded);
+        }
+        Ok(())
+    }
+
+    fn show(&self, trouble: Option<String>) {
+        let standing = self.poll.standing();
+        let trouble = trouble.or_else(|| standing.trouble.clone());
+        let wanted = u32::try_from(self.poll.held().len()).unwrap_or(u32::MAX);
+        self.errand.board.change(self.name(), |site| {
+            site.waiting = standing.waiting;
+            site.running = standing.running;
+            site.wanted = wanted;
+            site.trouble = trouble.unwrap_or_default();
+        });
+    }
+}

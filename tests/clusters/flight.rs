@@ -1,0 +1,117 @@
+//! A farm with one site, and what must hold of it.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::engine::{Engine, Kind};
+use crate::harness::scenes::{FLYBY, small};
+use crate::harness::{Farm, Place, wait};
+
+/// A farm whose coordinator has one site, called `test`.
+pub(crate) struct Flight {
+    pub(crate) farm: Farm,
+}
+
+impl Flight {
+    /// With these further lines in `sites.toml`.
+    pub(crate) fn new(engine: &Engine, kind: Kind, more: &str) -> Self {
+        Self::with_program(engine, kind, env!("CARGO_BIN_EXE_flyby"), more)
+    }
+
+    /// The same, with another program at the site.
+    pub(crate) fn with_program(engine: &Engine, kind: Kind, program: &str, more: &str) -> Self {
+        Self::at(&engine.site(kind), program, more)
+    }
+
+    /// The same, at a site of these lines.
+    pub(crate) fn at(site: &str, program: &str, more: &str) -> Self {
+        let place = Place::new();
+        let there = place.path("there");
+        let text = format!(
+            "[site.test]\n{site}folder = '{}'\nprogram = '{program}'\npoll = '1 s'\n{more}\n",
+            there.display(),
+        );
+        place.write("sites.toml", text);
+        Self {
+            farm: Farm::wrapped(place, &[], &["--sites", "sites.toml"]),
+        }
+    }
+
+    /// The site, as the coordinator sees it.
+    pub(crate) fn site(&self) -> Value {
+        let list = self.farm.flyby(["site", "list", "--output", "json"]).json();
+        list["sites"][0]["seen"].clone()
+    }
+
+    pub(crate) fn count(&self, name: &str) -> u64 {
+        self.site()[name].as_u64().unwrap()
+    }
+
+    #[track_caller]
+    pub(crate) fn wait_trouble(&self, phrases: &[&str]) {
+        let what = format!("the site's trouble holds {phrases:?}");
+        wait::until(&what, || {
+            let site = self.site();
+            let trouble = site["trouble"].as_str()?;
+            phrases
+                .iter()
+                .all(|phrase| trouble.contains(phrase))
+                .then_some(())
+        });
+    }
+
+    pub(crate) fn clean(&self) {
+        let clean = ["site", "clean", "test", "--sites", "sites.toml"];
+        self.farm.flyby(clean).ok();
+    }
+
+    /// Nothing of the farm is left at the site: neither folder nor process.
+    #[track_caller]
+    pub(crate) fn has_left_nothing(&self) {
+        let there = self.farm.place.path("there");
+        let left: Vec<_> = fs::read_dir(&there)
+            .into_iter()
+            .flatten()
+            .flatten()
+            .collect();
+        assert!(left.is_empty(), "{left:?}");
+        wait::until("no process of the site is left", || {
+            processes_with(&there.display().to_string())
+                .is_empty()
+                .then_some(())
+        });
+    }
+}
+
+/// Whatever becomes of a test, no process of a host without a queue stays behind.
+impl Drop for Flight {
+    fn drop(&mut self) {
+        // It would submit again.
+        if self.farm.coordinator.ended().is_none() {
+            self.farm.coordinator.kill();
+        }
+        let _ = self
+            .farm
+            .place
+            .flyby(["site", "clean", "test", "--sites", "sites.toml"]);
+    }
+}
+
+/// The command lines that hold a text, of everybody but who looks.
+fn processes_with(text: &str) -> Vec<String> {
+    let entries = fs::read_dir("/proc").unwrap().flatten();
+    let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
+    let lines = lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " "));
+    lines.filter(|line| line.contains(text)).collect()
+}
+
+/// The same frames as one process renders, and nothing left behind.
+pub(crate) fn renders_the_same(flight: &Flight) {
+    let job = flight.farm.submit(&small().with(&[FLYBY]));
+    let done = flight.farm.wait_done(job);
+    assert_eq!(done.film_digests(), small().digests);
+    assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+    flight.clean();
+    flight.has_left_nothing();
+}
