@@ -23,6 +23,7 @@ const CALLS: [(&str, &[&str]); 4] = [
             "Farm/Why",
             "Farm/FetchFrame",
             "Farm/ListWorkers",
+            "Farm/ListSites",
             "Farm/Info",
         ],
     ),
