@@ -5,19 +5,19 @@
 //! not brought all its blocks gives its tile back, so that the rest is leased anew (thesis §C.5); after three tries
 //! without a block a tile fails; after a refusal nothing is submitted for a while, longer each time.
 
+mod held;
+mod settings;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use model::{AttemptId, Begun, Digest, ImageRef, Lease, Rect, Revision, Running, Span, Timestamp};
+use model::{AttemptId, Begun, Digest, ImageRef, Lease, Rect, Running, Span, Timestamp};
 
-use crate::orders::{Had, Order, Seen, SeenArray, Stands, TaskOrder, Wants};
-use crate::queue::Limits;
-use crate::sites::{Kind, Site};
+use crate::orders::{Order, Seen, SeenArray, Stands, TaskOrder, Wants};
 
-/// Tasks of an array where neither the site nor its queue says how many there may be.
-pub const ARRAY_TASKS: u32 = 1_000;
+use held::{Array, History, Tile};
+pub use settings::{ARRAY_TASKS, Settings};
 
 /// Tries in a row that brought no block, after which a tile fails.
 const TRIES_MAX: u32 = 3;
@@ -42,50 +42,6 @@ const PAUSE_FIRST: Span = Span::from_secs(10);
 
 /// …and never longer than this.
 const PAUSE_LONGEST: Span = Span::from_secs(900);
-
-/// What does not change while a coordinator runs.
-#[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Settings {
-    /// What names of arrays begin with; a number follows. It differs from start to start, so that no name comes twice.
-    pub names: String,
-    /// The renderer's revision.
-    pub revision: Revision,
-    /// Render threads of a task.
-    pub threads: u32,
-    /// Most tasks of an array that run at a time, where the queue does not see to that.
-    pub running_max: Option<u32>,
-    /// Most tasks of an array.
-    pub array_max: u32,
-    /// Images that wait beyond the one that runs (thesis §C.3.5).
-    pub ahead: u32,
-    /// How long a task may run, by the site's word.
-    pub time_limit: Option<Span>,
-    /// The queue's own limit.
-    pub time_max: Option<Span>,
-}
-
-impl Settings {
-    /// Those of a site, by what it and its queue say.
-    pub fn of(site: &Site, limits: &Limits, names: String, revision: Revision) -> Self {
-        let array_max = [site.max_array_size, limits.array_tasks];
-        let processors = limits
-            .slots
-            .map(|(_, all)| (all / site.threads.max(1)).max(1));
-        Self {
-            names,
-            revision,
-            threads: site.threads,
-            running_max: match site.kind {
-                Kind::Slurm | Kind::GridEngine => site.max_running,
-                Kind::Ssh | Kind::Local => site.max_running.or(processors),
-            },
-            array_max: array_max.into_iter().flatten().min().unwrap_or(ARRAY_TASKS),
-            ahead: site.ahead,
-            time_limit: site.time_limit,
-            time_max: limits.time,
-        }
-    }
-}
 
 /// What to do now, in this order.
 #[derive(Clone, PartialEq, Eq, Debug)]
@@ -135,47 +91,6 @@ pub struct Poll {
     failures: u32,
     quiet_until: Timestamp,
     standing: Standing,
-}
-
-/// A tile that is leased to the site.
-#[derive(Clone, Debug)]
-struct Tile {
-    lease: Lease,
-    missing: BTreeSet<Rect>,
-    /// Blocks that have arrived, those that an earlier coordinator had among them.
-    arrived: u32,
-    inherited: u32,
-    /// How long they took one thread.
-    took: Span,
-    /// Bytes of its file that are done with.
-    offset: u64,
-    runs: bool,
-    place: Option<(String, u32)>,
-}
-
-/// An array that is there, or may be.
-#[derive(Clone, Debug)]
-struct Array {
-    /// The tile of each task, as long as it is wanted.
-    tiles: Vec<Option<AttemptId>>,
-    /// Whether it is known that it was submitted.
-    is_sure: bool,
-    time_limit: Option<Span>,
-    /// Tasks that were deleted from here.
-    deleted: BTreeSet<u32>,
-}
-
-/// What became of a tile before.
-#[derive(Clone, Copy, Debug, Default)]
-struct History {
-    /// Tries in a row that brought nothing.
-    tries: u32,
-    /// What one block takes one thread.
-    block: Span,
-    /// The last limit.
-    limit: Option<Span>,
-    /// When it was last of use.
-    observation: u64,
 }
 
 impl Poll {
@@ -577,41 +492,6 @@ impl Poll {
             array.tiles[place] = None;
         }
         Some(tile)
-    }
-}
-
-impl Tile {
-    fn new(lease: Lease, place: Option<(String, u32)>) -> Self {
-        Self {
-            missing: lease.blocks().collect(),
-            lease,
-            arrived: 0,
-            inherited: 0,
-            took: Span(0),
-            offset: 0,
-            runs: false,
-            place,
-        }
-    }
-
-    /// An earlier coordinator had this of it already.
-    fn inherits(&mut self, had: &Had) {
-        self.offset = had.0;
-        for block in had.blocks() {
-            self.inherited += u32::from(self.missing.remove(&block));
-        }
-        self.arrived = self.inherited;
-    }
-}
-
-impl Array {
-    fn place(&self, task: u32) -> Option<usize> {
-        let place = usize::try_from(task.checked_sub(1)?).ok()?;
-        (place < self.tiles.len()).then_some(place)
-    }
-
-    fn attempt(&self, task: u32) -> Option<AttemptId> {
-        self.tiles[self.place(task)?]
     }
 }
 

@@ -1,9 +1,9 @@
 //! A site that takes what it is given, and does with it what each test says.
 
-use model::{Epoch, ImageNumber, JobId};
+use model::{Epoch, ImageNumber, JobId, Revision};
 
 use super::*;
-use crate::orders::SeenTask;
+use crate::orders::{Had, SeenTask};
 
 const TAKES: Span = Span::from_secs(10);
 
