@@ -1,5 +1,6 @@
 //! Real engines on this machine, by the scripts beside this file: started for one test, and stopped with it.
 
+use std::net::Ipv4Addr;
 use std::os::unix::process::CommandExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -93,6 +94,12 @@ impl Engine {
             .process_group(0)
             .output()
             .unwrap_or_else(|why| panic!("cannot run {name}: {why}"))
+    }
+
+    /// The address at which its hosts, which have networks of their own, find this machine.
+    pub(crate) fn head(&self) -> Ipv4Addr {
+        let subnet = std::fs::read_to_string(self.folder.join("net/subnet")).unwrap();
+        format!("{}.1", subnet.trim()).parse().unwrap()
     }
 
     /// Runs one of the tools in its `bin`; it must do what was asked.

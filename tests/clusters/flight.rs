@@ -1,6 +1,7 @@
 //! A farm with one site, and what must hold of it.
 
 use std::fs;
+use std::net::Ipv4Addr;
 
 use serde_json::Value;
 
@@ -26,6 +27,16 @@ impl Flight {
 
     /// The same, at a site of these lines.
     pub(crate) fn at(site: &str, program: &str, more: &str) -> Self {
+        Self::on(Ipv4Addr::LOCALHOST, site, program, more)
+    }
+
+    /// A coordinator on an address that the hosts of an engine dial, so that they join over TLS.
+    pub(crate) fn over_tls(engine: &Engine, kind: Kind, more: &str) -> Self {
+        let program = env!("CARGO_BIN_EXE_flyby");
+        Self::on(engine.head(), &engine.site(kind), program, more)
+    }
+
+    fn on(listens: Ipv4Addr, site: &str, program: &str, more: &str) -> Self {
         let place = Place::new();
         let there = place.path("there");
         let text = format!(
@@ -34,7 +45,7 @@ impl Flight {
         );
         place.write("sites.toml", text);
         Self {
-            farm: Farm::wrapped(place, &[], &["--sites", "sites.toml"]),
+            farm: Farm::listening(listens.into(), place, &[], &["--sites", "sites.toml"]),
         }
     }
 

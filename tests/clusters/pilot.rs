@@ -57,6 +57,27 @@ fn grid_engine_gives_the_frames_of_one_process() {
 
 #[test]
 #[ignore = "long: tests/run --all"]
+fn grid_engine_s_hosts_join_over_tls() {
+    let Some(engine) = Engine::gridengine(2, &[]) else {
+        return;
+    };
+    let flight = Flight::over_tls(&engine, Kind::GridEngine, "mode = 'pilot'\nidle = '3 s'");
+    renders_the_same(&flight);
+    let tokens = flight
+        .farm
+        .flyby(["token", "list", "--output", "json"])
+        .json();
+    // One token for all of them.
+    assert_eq!(
+        tokens["tokens"].as_array().map(Vec::len),
+        Some(1),
+        "{tokens}"
+    );
+    assert!(tokens["tokens"][0]["used"].as_u64() > Some(0), "{tokens}");
+}
+
+#[test]
+#[ignore = "long: tests/run --all"]
 fn hosts_without_a_queue_give_the_frames_of_one_process() {
     let Some(engine) = Engine::ssh() else {
         return;

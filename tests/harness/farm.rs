@@ -52,7 +52,8 @@ impl Farm {
         Self::listening(address, Place::new(), &[], options)
     }
 
-    fn listening(on: IpAddr, place: Place, wrapper: &[&str], options: &[&str]) -> Self {
+    /// [`Farm::wrapped`], listening there.
+    pub(crate) fn listening(on: IpAddr, place: Place, wrapper: &[&str], options: &[&str]) -> Self {
         let kept = |words: &[&str]| {
             words
                 .iter()
