@@ -21,3 +21,4 @@ mod engine;
 mod flight;
 mod pilot;
 mod poll;
+mod two_sites;
