@@ -10,13 +10,13 @@ use std::os::unix::fs::DirBuilderExt as _;
 use std::os::unix::process::CommandExt as _;
 use std::path::Path;
 use std::process::{Child, Command, ExitStatus, Stdio};
-use std::sync::mpsc::{self, Receiver};
+use std::sync::mpsc::{self, Receiver, Sender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use model::Span;
-use rustix::process::{Pid, Signal, kill_process_group};
+use rustix::process::{Pid, Signal, WaitId, WaitIdOptions, kill_process_group, waitid};
 
 use crate::error::{ClusterError, Refusal};
 use crate::sites::Site;
@@ -233,8 +233,9 @@ impl Way {
             Ok(child) => Group(child),
             Err(error) => return (Raw::default(), Err(error)),
         };
-        let stdout = Gathered::from(child.0.stdout.take(), STDOUT_MAX);
-        let stderr = Gathered::from(child.0.stderr.take(), STDERR_MAX);
+        let (comes, came) = mpsc::channel();
+        let stdout = Gathered::from(child.0.stdout.take(), STDOUT_MAX, Some(comes.clone()));
+        let stderr = Gathered::from(child.0.stderr.take(), STDERR_MAX, None);
         let stdin = child.0.stdin.take();
         let ended = thread::scope(|scope| {
             scope.spawn(move || {
@@ -244,7 +245,14 @@ impl Way {
                     let _ = io::copy(&mut input, &mut stdin).and_then(|_| stdin.flush());
                 }
             });
-            child.wait(deadline, &stdout)
+            let leader = Pid::from_child(&child.0);
+            scope.spawn(move || {
+                // It is not taken away: its number stays its own until whoever may kill it has done that.
+                let ended = WaitIdOptions::EXITED | WaitIdOptions::NOWAIT;
+                let _ = waitid(WaitId::Pid(leader), ended);
+                let _ = comes.send(Came::Ended);
+            });
+            child.wait(deadline, &came)
         });
         let raw = Raw {
             code: ended.and_then(|status| status.code()),
@@ -365,23 +373,23 @@ fn quote_always(text: &str) -> String {
 /// A process that is killed, with all in its group, where it is dropped before it was waited for.
 struct Group(Child);
 
+/// What a process that runs is waited for.
+enum Came {
+    /// It has ended.
+    Ended,
+    /// It has printed all that it may.
+    Full,
+}
+
 impl Group {
-    /// How it ended; `None` where that is too late, or it prints too much.
-    fn wait(&mut self, deadline: Instant, stdout: &Gathered) -> Option<ExitStatus> {
-        let mut pause = Duration::from_millis(1);
-        loop {
-            match self.0.try_wait() {
-                Ok(Some(status)) => return Some(status),
-                Ok(None) if Instant::now() < deadline && !stdout.is_full() => {
-                    thread::sleep(pause);
-                    pause = (pause * 2).min(Duration::from_millis(20));
-                }
-                _ => break,
-            }
+    /// How it ended, killed where it prints too much; `None` where it has to be killed because it is too late.
+    fn wait(&mut self, deadline: Instant, came: &Receiver<Came>) -> Option<ExitStatus> {
+        let came = came.recv_timeout(deadline.saturating_duration_since(Instant::now()));
+        if !matches!(came, Ok(Came::Ended)) {
+            self.kill();
         }
-        self.kill();
         let status = self.0.wait().ok();
-        status.filter(|_| stdout.is_full())
+        status.filter(|_| came.is_ok())
     }
 
     fn kill(&self) {
@@ -400,7 +408,12 @@ struct Gathered {
 }
 
 impl Gathered {
-    fn from(pipe: Option<impl Read + Send + 'static>, most: usize) -> Self {
+    /// `full` hears of it when there is as much as there may be.
+    fn from(
+        pipe: Option<impl Read + Send + 'static>,
+        most: usize,
+        full: Option<Sender<Came>>,
+    ) -> Self {
         let bytes = Arc::<Mutex<Vec<u8>>>::default();
         let (end, ended) = mpsc::channel();
         let into = bytes.clone();
@@ -412,6 +425,9 @@ impl Gathered {
                 // What is over the limit is read and dropped, so that nobody waits for a reader.
                 if into.len() < most {
                     into.extend_from_slice(&chunk[..count]);
+                    if let Some(full) = full.as_ref().filter(|_| into.len() >= most) {
+                        let _ = full.send(Came::Full);
+                    }
                 }
             }
             let _ = end.send(());

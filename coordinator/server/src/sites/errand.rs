@@ -1,6 +1,5 @@
 //! The thread of one site. In pilot mode it asks the loop what is wanted and the queue what is there, and does what the pilot says.
 
-use std::thread;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use cluster::camp::Camp;
@@ -13,9 +12,9 @@ use tokio::runtime::Handle;
 use tokio::sync::{mpsc, oneshot};
 use tokio::time::timeout;
 
-use super::Board;
 use super::pass::Pass;
 use super::poll::Poller;
+use super::{Board, rest};
 use crate::input::{Gates, Input, Query};
 
 /// The least time between two looks at the queue, however often there may be something new.
@@ -90,11 +89,12 @@ impl Errand {
                     longer.min(PAUSE_LONGEST).max(poll)
                 }
             };
-            let woken = async { timeout(pause, woken.recv()).await };
-            match self.runtime.block_on(woken) {
+            let awake = async { timeout(pause, woken.recv()).await };
+            match self.runtime.block_on(awake) {
                 Ok(None) => return,
                 Err(_) => {}
-                Ok(Some(())) => thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
+                Ok(Some(())) if !rest(&self.runtime, &mut woken, begun + LOOK_LEAST) => return,
+                Ok(Some(())) => {}
             }
         }
     }

@@ -10,10 +10,12 @@ use std::cell::RefCell;
 use std::net::SocketAddr;
 use std::sync::Arc;
 use std::thread;
+use std::time::Instant;
 
 use cluster::camp::{Camp, farm_of};
 use tokio::runtime::Handle;
 use tokio::sync::mpsc;
+use tokio::time::timeout_at;
 
 use crate::config::Config;
 use crate::input::{Gates, Input};
@@ -24,6 +26,20 @@ use crate::trust::Trust;
 pub(crate) use self::board::Board;
 use self::errand::Errand;
 use self::pass::{Pass, Token};
+
+/// Waits until a moment, and not for that where the loop ends before; whether it has not. What wakes meanwhile is
+/// answered by the look that follows.
+fn rest(runtime: &Handle, woken: &mut mpsc::Receiver<()>, until: Instant) -> bool {
+    runtime.block_on(async {
+        loop {
+            match timeout_at(until.into(), woken.recv()).await {
+                Ok(Some(())) => {}
+                Ok(None) => return false,
+                Err(_) => return true,
+            }
+        }
+    })
+}
 
 /// The loop's end of the threads; they end when it is dropped.
 #[derive(Debug)]

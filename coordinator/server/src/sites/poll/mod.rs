@@ -20,6 +20,7 @@ use self::desk::{Desk, Looked};
 use self::line::{Became, Cut, Hello, Line};
 use self::scenes::Scenes;
 use super::errand::{Errand, Stopping, program_makes, unix_ms, words};
+use super::rest;
 use crate::input::AboutWorker;
 
 /// After so many looks in a row that failed, others may have the site's tiles.
@@ -137,8 +138,8 @@ impl<'a> Poller<'a> {
                 return;
             }
             match self.wait(pause, woken) {
-                Ok(true) => std::thread::sleep(LOOK_LEAST.saturating_sub(begun.elapsed())),
-                Ok(false) => {}
+                Ok(true) if !rest(&self.errand.runtime, woken, begun + LOOK_LEAST) => return,
+                Ok(true | false) => {}
                 Err(Cut::Stopping) => return,
                 Err(Cut::Ended(_)) => self.line = None,
             }
