@@ -250,12 +250,13 @@ fn install_at(context: &Context, options: &Install) -> Result<Ending, Error> {
 fn clean(context: &Context, options: &Clean) -> Result<Ending, Error> {
     let site = options.file.site(context, &options.name)?;
     let camp = camp(context, site)?;
-    let ended = camp
+    let done = camp
         .clean()
         .map_err(|error| failed(&camp.site, "cannot clean", error))?;
     let cleaned = Cleaned {
         site: camp.site.name.clone(),
-        allocations_ended: ended,
+        allocations_ended: done.ended,
+        allocations_away: done.away.iter().map(ToString::to_string).collect(),
     };
     output::print(context.output, &cleaned)?;
     Ok(Ending::Done)

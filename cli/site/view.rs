@@ -44,6 +44,12 @@ struct Seen {
     trouble: Option<String>,
     /// When its queue was asked last, milliseconds since 1970 (UTC); null is never.
     asked_unix_ms: Option<u64>,
+    /// Blocks that were fetched from it in poll mode since the coordinator was started.
+    fetched_blocks: u64,
+    /// Their bytes.
+    fetched_bytes: u64,
+    /// Of those blocks the ones that were durable already, and so fetched in vain.
+    fetched_again: u64,
 }
 
 impl From<&Site> for SiteView {
@@ -72,6 +78,9 @@ impl From<SiteStatus> for SiteView {
                 wanted: site.wanted,
                 trouble: said(site.trouble),
                 asked_unix_ms: Some(site.asked_unix_ms).filter(|&asked| asked > 0),
+                fetched_blocks: site.fetched_blocks,
+                fetched_bytes: site.fetched_bytes,
+                fetched_again: site.fetched_again,
             }),
         }
     }
@@ -184,6 +193,8 @@ pub(crate) struct Cleaned {
     pub(crate) site: String,
     /// Allocations that waited or ran, and were ended.
     pub(crate) allocations_ended: usize,
+    /// Those that the queue still shows, on hosts of which it hears nothing.
+    pub(crate) allocations_away: Vec<String>,
 }
 
 impl Report for Cleaned {
@@ -192,7 +203,16 @@ impl Report for Cleaned {
             out,
             "{} allocations were ended; nothing of this farm is left at {}.",
             self.allocations_ended, self.site
-        )
+        )?;
+        match self.allocations_away.is_empty() {
+            true => Ok(()),
+            false => writeln!(
+                out,
+                "Its queue still shows {}, on hosts of which it hears nothing: they go when the hosts come back, or an \
+                 operator of the queue deletes them.",
+                self.allocations_away.join(", ")
+            ),
+        }
     }
 
     fn quiet(&self, out: &mut dyn Write) -> io::Result<()> {

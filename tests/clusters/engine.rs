@@ -54,6 +54,13 @@ impl Engine {
             .then_some(engine)
     }
 
+    /// Hosts `node1`, `node2`, … without a queue, on networks of their own, with ssh.
+    pub(crate) fn hosts(nodes: u32) -> Option<Self> {
+        let mut engine = Self::new();
+        let is_up = engine.up("netns", &[&nodes.to_string()], &[]) && engine.add_ssh();
+        is_up.then_some(engine)
+    }
+
     /// ssh on loopback alone, as `node1`.
     pub(crate) fn ssh() -> Option<Self> {
         let mut engine = Self::new();

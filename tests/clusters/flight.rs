@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::engine::{Engine, Kind};
 use crate::harness::scenes::{FLYBY, small};
-use crate::harness::{Farm, Place, wait};
+use crate::harness::{Farm, Place, frames, wait};
 
 /// A farm whose coordinator has one site, called `test`.
 pub(crate) struct Flight {
@@ -87,10 +87,15 @@ impl Flight {
             .flatten()
             .collect();
         assert!(left.is_empty(), "{left:?}");
+        self.runs_nothing();
+    }
+
+    /// No process of the site runs, on whichever of its hosts.
+    #[track_caller]
+    pub(crate) fn runs_nothing(&self) {
+        let there = self.farm.place.path("there").display().to_string();
         wait::until("no process of the site is left", || {
-            processes_with(&there.display().to_string())
-                .is_empty()
-                .then_some(())
+            processes_with(&there).is_empty().then_some(())
         });
     }
 }
@@ -110,7 +115,7 @@ impl Drop for Flight {
 }
 
 /// The command lines that hold a text, of everybody but who looks.
-fn processes_with(text: &str) -> Vec<String> {
+pub(crate) fn processes_with(text: &str) -> Vec<String> {
     let entries = fs::read_dir("/proc").unwrap().flatten();
     let lines = entries.filter_map(|entry| fs::read(entry.path().join("cmdline")).ok());
     let lines = lines.map(|line| String::from_utf8_lossy(&line).replace('\0', " "));
@@ -121,7 +126,7 @@ fn processes_with(text: &str) -> Vec<String> {
 pub(crate) fn renders_the_same(flight: &Flight) {
     let job = flight.farm.submit(&small().with(&[FLYBY]));
     let done = flight.farm.wait_done(job);
-    assert_eq!(done.film_digests(), small().digests);
+    frames::are_same(&flight.farm.frames(job), &small().frames);
     assert_eq!(done.number("blocks_again"), 0, "{done:?}");
     flight.clean();
     flight.has_left_nothing();

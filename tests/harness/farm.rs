@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use serde_json::Value;
 
-use super::{Job, Outcome, Place, Process, wait};
+use super::{Job, Outcome, Place, Process, frames, wait};
 
 /// When a coordinator is killed that has just been started.
 #[derive(Clone, Copy, Debug)]
@@ -220,6 +220,15 @@ impl Farm {
         let job = self.job(job);
         assert_eq!(job.state(), "done", "{job:?}\n{watched}");
         job
+    }
+
+    /// The files of a job that is done, as [`frames`] compares them.
+    #[track_caller]
+    pub(crate) fn frames(&self, job: u64) -> Vec<Vec<u8>> {
+        let out = format!("frames-{job}");
+        self.flyby(["job", "fetch", &job.to_string(), "--out", &out])
+            .ok();
+        frames::frames(&self.place.path(&out))
     }
 
     /// How many workers the coordinator counts as connected.

@@ -6,6 +6,7 @@
 //! - [`Farm`]: a coordinator, its workers and its jobs.
 //! - [`Proxy`]: a link between a worker and its coordinator that can be cut and frozen.
 //! - [`SmallDisk`]: a state folder on a disk of its own, which can be filled.
+//! - [`frames`]: frames as files, to be compared byte for byte.
 //! - [`raw`]: a client that says to a coordinator what no worker of ours would say.
 //! - [`wait`]: waiting for conditions; nothing here sleeps for a time and hopes.
 //! - [`need`]: tools that a machine may lack.
@@ -15,6 +16,7 @@
 mod command;
 mod disk;
 mod farm;
+pub(crate) mod frames;
 mod job;
 pub(crate) mod need;
 mod place;

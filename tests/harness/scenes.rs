@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-use super::{Place, wait};
+use super::{Place, frames, wait};
 
 /// The thesis's animation.
 pub(crate) const FLYBY: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/flyby.toml");
@@ -23,6 +23,8 @@ pub(crate) struct Reference {
     settings: Vec<String>,
     /// The images' film digests.
     pub(crate) digests: Vec<String>,
+    /// Their files, as [`frames`] compares them.
+    pub(crate) frames: Vec<Vec<u8>>,
 }
 
 impl Reference {
@@ -36,8 +38,10 @@ impl Reference {
             "--frames",
             "0..2",
         ];
+        let place = Place::new();
         Self {
-            digests: rendered(&Place::new(), "reference", &settings),
+            digests: rendered(&place, "reference", &settings),
+            frames: frames::frames(&place.path("reference")),
             settings: settings.map(str::to_owned).to_vec(),
         }
     }

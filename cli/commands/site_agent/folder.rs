@@ -62,11 +62,6 @@ impl Folder {
         Ok(self.array(array)?.join(format!("{task}.blocks")))
     }
 
-    /// How much of the blocks the coordinator has.
-    pub(super) fn had(&self, array: &str) -> Result<PathBuf, Error> {
-        Ok(self.array(array)?.join("had.json"))
-    }
-
     /// What an array is to render.
     pub(super) fn order(&self, array: &str) -> Result<Order, Error> {
         let path = self.array(array)?.join("order.json");

@@ -8,8 +8,8 @@ use std::io::{self, BufWriter, Read as _, Seek as _, SeekFrom, Write};
 use std::path::Path;
 
 use cluster::orders::{
-    End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Had, Look, Seen, SeenArray, SeenTask, Stands,
-    Wants, edges,
+    End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Look, Seen, SeenArray, SeenTask, Stands, Wants,
+    edges,
 };
 use cluster::{Task, TaskState};
 use wire::block::BlockRecord;
@@ -32,9 +32,6 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
     for name in names(&folder.arrays())? {
         arrays.push(array(folder, &name, &known, shown.get(&name))?);
     }
-    for wants in &request.wants {
-        note(folder, wants)?;
-    }
     // What the queue has of ours that has no folder is nobody's.
     for (name, tasks) in &shown {
         let is_there = arrays.iter().any(|array| array.name == *name);
@@ -45,7 +42,6 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
                 is_submitted: true,
                 order: None,
                 tasks: numbered(tasks, tasks.keys().max().copied().unwrap_or(0)),
-                had: Vec::new(),
             });
         }
     }
@@ -63,6 +59,7 @@ fn by_array(tasks: Vec<Task>) -> BTreeMap<String, Shown> {
         let stands = match task.state {
             TaskState::Waiting { .. } | TaskState::Held { .. } => Stands::Waits,
             TaskState::Running { .. } | TaskState::Ending => Stands::Runs,
+            TaskState::Away { .. } => Stands::Away,
             _ => Stands::Ended,
         };
         let number = task.id.task.unwrap_or(1);
@@ -102,74 +99,12 @@ fn array(
         }
     }
     let order = order.filter(|_| !known.contains(name));
-    let had = match order {
-        Some(_) => had(folder, name)?,
-        None => Vec::new(),
-    };
     Ok(SeenArray {
         name: name.to_owned(),
         is_submitted: shown.is_some() || folder.id(name)?.is_some(),
         order,
         tasks,
-        had,
     })
-}
-
-/// How much of each task's file the coordinator had when it asked last.
-fn offsets(folder: &Folder, array: &str) -> Result<Vec<u64>, Error> {
-    // One that cannot be read costs no more than that blocks are fetched once more.
-    let text = fs::read(folder.had(array)?).unwrap_or_default();
-    Ok(serde_json::from_slice(&text).unwrap_or_default())
-}
-
-/// Notes what the coordinator has, for one that comes after it.
-fn note(folder: &Folder, wants: &Wants) -> Result<(), Error> {
-    let before = offsets(folder, &wants.array)?;
-    let offset = |(place, offset): (usize, &Option<u64>)| {
-        let before = before.get(place).copied().unwrap_or(0);
-        offset.unwrap_or(before)
-    };
-    let now: Vec<u64> = wants.offsets.iter().enumerate().map(offset).collect();
-    if now == before || now.iter().all(|&offset| offset == 0) {
-        return Ok(());
-    }
-    let path = folder.had(&wants.array)?;
-    // It is of use alone; an array that was removed meanwhile has no folder, and a disk that is full has no room.
-    if path.parent().is_some_and(Path::is_dir) {
-        let text = serde_json::to_vec(&now).unwrap_or_default();
-        let _ = super::folder::write(&path, &text);
-    }
-    Ok(())
-}
-
-/// What the coordinator had, block by block.
-fn had(folder: &Folder, array: &str) -> Result<Vec<Had>, Error> {
-    let mut all = Vec::new();
-    for (task, offset) in (1..).zip(offsets(folder, array)?) {
-        let path = folder.blocks(array, task)?;
-        let mut bytes = Vec::new();
-        if offset > 0 {
-            let read = File::open(&path).and_then(|file| file.take(offset).read_to_end(&mut bytes));
-            read.map_err(cannot("read", &path))?;
-        }
-        let mut had = Had(offset, Vec::new());
-        let mut rest = &bytes[..];
-        loop {
-            let length = match spool::read(rest) {
-                Entry::Block(delivery, length) => {
-                    if let Ok(record) = BlockRecord::only(&delivery.record) {
-                        had.1.push(edges(record.header.rect));
-                    }
-                    length
-                }
-                Entry::Damaged(length) => length,
-                Entry::End => break,
-            };
-            rest = &rest[length..];
-        }
-        all.push(had);
-    }
-    Ok(all)
 }
 
 /// What is in a folder, with its length. One that is gone is empty.
@@ -206,12 +141,14 @@ fn answer(folder: &Folder, seen: &Seen, wants: &[Wants]) -> io::Result<()> {
     };
     let mut end = End::Whole;
     'all: for (place, wants) in (0..).zip(wants) {
+        let mut but = wants.but.iter();
         for (task, offset) in (1..).zip(&wants.offsets) {
+            let but = but.next().map_or(&[][..], Vec::as_slice);
             let Some(offset) = *offset else { continue };
             let Ok(path) = folder.blocks(&wants.array, task) else {
                 continue;
             };
-            if send(&path, offset, (place, task), &mut room, &mut out)? == End::More {
+            if send(&path, (offset, but), (place, task), &mut room, &mut out)? == End::More {
                 end = End::More;
                 break 'all;
             }
@@ -227,10 +164,10 @@ struct Room {
     blocks: u32,
 }
 
-/// Sends the whole blocks of a task's file beyond an offset, as far as there is room.
+/// Sends the whole blocks of a task's file beyond an offset but for some, as far as there is room.
 fn send(
     path: &Path,
-    offset: u64,
+    (offset, but): (u64, &[[u32; 4]]),
     (array, task): (u32, u32),
     room: &mut Room,
     out: &mut impl Write,
@@ -253,16 +190,32 @@ fn send(
         }
         let (entry, after) = rest.split_at(length);
         at += length as u64;
+        rest = after;
+        if is_one_of(entry, but) {
+            continue;
+        }
         let head = Frame::head(array, task, at, u32::try_from(length).unwrap_or(u32::MAX));
         out.write_all(&head)?;
         out.write_all(entry)?;
         room.bytes -= length as u64;
         room.blocks -= 1;
-        rest = after;
     }
     // What was read ends where the room did.
     Ok(match offset + (bytes.len() as u64) < length {
         true => End::More,
         false => End::Whole,
     })
+}
+
+/// Whether an entry holds one of these blocks.
+fn is_one_of(entry: &[u8], blocks: &[[u32; 4]]) -> bool {
+    // Nothing is read where nothing is asked.
+    if blocks.is_empty() {
+        return false;
+    }
+    let Entry::Block(delivery, _) = spool::read(entry) else {
+        return false;
+    };
+    let record = BlockRecord::only(&delivery.record);
+    record.is_ok_and(|record| blocks.contains(&edges(record.header.rect)))
 }

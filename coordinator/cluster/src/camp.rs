@@ -13,7 +13,7 @@ use std::time::{Duration, Instant};
 use model::Span;
 
 use crate::error::ClusterError;
-use crate::queue::{self, Queue, TaskId};
+use crate::queue::{self, Queue, Task, TaskId, TaskState};
 use crate::sites::Site;
 use crate::way::{LIMIT, Way};
 use crate::words::quote_path;
@@ -76,6 +76,16 @@ pub fn farm_of(state: &Path) -> Result<String, ClusterError> {
         Err(error) if error.kind() == io::ErrorKind::AlreadyExists => farm_of(state),
         written => written.map(|()| name).map_err(failed("write")),
     }
+}
+
+/// What became of all that a farm had at a site.
+#[derive(Clone, PartialEq, Eq, Debug, Default)]
+pub struct Cleaned {
+    /// Allocations that waited or ran, and were ended.
+    pub ended: usize,
+    /// Those that the queue still shows, on hosts of which it hears nothing: they go when the hosts come back, or by an
+    /// operator's hand.
+    pub away: Vec<TaskId>,
 }
 
 /// One farm at one site.
@@ -144,22 +154,25 @@ impl Camp {
         self.way.ask("removing old logs", "ls", &script).map(|_| ())
     }
 
-    /// Ends and removes all that this farm has there; answers how many allocations were ended.
-    pub fn clean(&self) -> Result<usize, ClusterError> {
+    /// Ends and removes all that this farm has there.
+    pub fn clean(&self) -> Result<Cleaned, ClusterError> {
         let prefix = self.prefix();
         let deadline = Instant::now() + END_LIMIT;
-        let mut ended = 0;
+        let mut cleaned = Cleaned::default();
+        let mut asked = false;
         loop {
-            let tasks = self.queue.list(&prefix)?;
-            let live: Vec<TaskId> = tasks
-                .into_iter()
-                .filter(|task| task.state.is_live())
-                .map(|task| task.id)
-                .collect();
-            if live.is_empty() {
+            let mut tasks = self.queue.list(&prefix)?;
+            tasks.retain(|task| task.state.is_live());
+            let ids = |tasks: &[Task]| tasks.iter().map(|task| task.id.clone()).collect();
+            let live: Vec<TaskId> = ids(&tasks);
+            cleaned.ended = cleaned.ended.max(live.len());
+            tasks.retain(|task| matches!(task.state, TaskState::Away { .. }));
+            cleaned.away = ids(&tasks);
+            // Those whose hosts are gone end at once, or for nobody.
+            if live.is_empty() || (asked && cleaned.away.len() == live.len()) {
                 break;
             }
-            ended = ended.max(live.len());
+            asked = true;
             if Instant::now() > deadline {
                 return Err(ClusterError::TimedOut {
                     attempt: format!("ending {} allocations", live.len()),
@@ -179,7 +192,10 @@ impl Camp {
             format!("rm -rf {folder} && {{ rmdir \"$(dirname {folder})\" 2>/dev/null || :; }}");
         let said = self.way.run("removing what is left", &script, LIMIT)?;
         match said.code {
-            Some(0) => Ok(ended),
+            Some(0) => {
+                cleaned.ended -= cleaned.away.len();
+                Ok(cleaned)
+            }
             _ => Err(said.refused("removing what is left", "rm")),
         }
     }

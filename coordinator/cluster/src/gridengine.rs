@@ -1,5 +1,6 @@
 //! Grid Engine: Sun's, Son of, Univa's and Open.
 
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
 use model::Span;
@@ -89,9 +90,9 @@ impl Queue for GridEngine {
 
     fn list(&self, prefix: &str) -> Result<Vec<Task>, ClusterError> {
         let attempt = "asking Grid Engine for its jobs";
-        let said = self
-            .way
-            .ask(attempt, "qstat", "qstat -xml -u \"$(id -un)\"")?;
+        // A host that fails leaves its tasks as they were: which of them nobody hears from stands with the queues.
+        let script = "qstat -xml -u \"$(id -un)\" && echo == && qstat -f -qs u -s r -xml";
+        let said = self.way.ask(attempt, "qstat", script)?;
         tasks(&said, prefix).map_err(|what| ClusterError::Nonsense {
             attempt: attempt.to_owned(),
             what,
@@ -135,18 +136,39 @@ impl Queue for GridEngine {
                 || line.trim().is_empty()
         });
         match said.code {
-            Some(0) => Ok(()),
-            Some(127) => Err(said.refused(attempt, "qdel")),
-            _ if are_gone => Ok(()),
+            Some(0) => {}
+            Some(127) => return Err(said.refused(attempt, "qdel")),
+            _ if are_gone => {}
             _ => {
                 let words = brief(&format!("{}\n{}", said.stdout, said.stderr));
-                Err(ClusterError::Refused {
+                return Err(ClusterError::Refused {
                     attempt: attempt.to_owned(),
                     refusal: Refusal::of(&words),
                     said: words,
-                })
+                });
             }
         }
+        self.force(tasks)
+    }
+}
+
+impl GridEngine {
+    /// Deletes those of the tasks that are on hosts of which the queue hears nothing: it waits for their hosts else. Only
+    /// managers may, unless the queue lets everybody (`ENABLE_FORCED_QDEL`): where it refuses they stay.
+    fn force(&self, deleted: &[TaskId]) -> Result<(), ClusterError> {
+        let shown = self.list("")?;
+        let is_deleted =
+            |id: &TaskId| deleted.contains(id) || deleted.contains(&TaskId::whole(&id.array));
+        let away = shown
+            .iter()
+            .filter(|task| matches!(task.state, TaskState::Away { .. }) && is_deleted(&task.id));
+        let away: Vec<String> = away.map(|task| task.id.to_string()).collect();
+        if !away.is_empty() {
+            let script = format!("qdel -f {}", quote_all(away));
+            self.way
+                .run("deleting what has lost its host", &script, LIMIT)?;
+        }
+        Ok(())
     }
 }
 
@@ -189,9 +211,18 @@ fn submission(site: &Site, array: &Array, script: &str) -> String {
     format!("mkdir -p \"$(dirname {log})\" && qsub {options} -o {log} <<'{end}'\n{script}{end}\n")
 }
 
-/// What `qstat -xml` printed, of the names that begin so.
+/// What `qstat -xml` printed, of the names that begin so; behind `==` what it printed of the queues whose hosts do not answer.
 fn tasks(said: &str, prefix: &str) -> Result<Vec<Task>, String> {
-    let document = Document::parse(said.trim_start()).map_err(|error| error.to_string())?;
+    let (jobs, queues) = said.split_once("\n==\n").unwrap_or((said, ""));
+    let parse = |text| Document::parse(text).map_err(|error| error.to_string());
+    let document = parse(jobs.trim_start())?;
+    let mut away = BTreeSet::new();
+    if !queues.trim().is_empty() {
+        let queues = parse(queues.trim())?;
+        let listed = queues.descendants();
+        let listed = listed.filter(|node| node.has_tag_name("Queue-List"));
+        away.extend(listed.filter_map(|queue| text(queue, "name").map(str::to_owned)));
+    }
     let mut tasks = Vec::new();
     for job in document
         .descendants()
@@ -203,11 +234,13 @@ fn tasks(said: &str, prefix: &str) -> Result<Vec<Task>, String> {
         if !name.starts_with(prefix) {
             continue;
         }
-        let state = state_of(
-            array,
-            text(job, "state").unwrap_or_default(),
-            text(job, "queue_name"),
-        );
+        let queue = text(job, "queue_name").filter(|queue| !queue.is_empty());
+        let state = match queue {
+            Some(queue) if away.contains(queue) => TaskState::Away {
+                host: host_of(queue).to_owned(),
+            },
+            _ => state_of(array, text(job, "state").unwrap_or_default(), queue),
+        };
         let Some(numbers) = numbers(text(job, "tasks").unwrap_or("1")) else {
             return Err(format!("tasks of job {array} that are no numbers"));
         };
@@ -243,13 +276,15 @@ fn state_of(array: &str, letters: &str, queue: Option<&str>) -> TaskState {
     } else if has('q') || has('w') {
         TaskState::Waiting { why: String::new() }
     } else {
-        let host = queue
-            .and_then(|queue| queue.split_once('@'))
-            .map_or("", |(_, host)| host);
         TaskState::Running {
-            host: host.to_owned(),
+            host: queue.map_or("", host_of).to_owned(),
         }
     }
+}
+
+/// The host of a queue's part, such as `all.q@node7`.
+fn host_of(queue: &str) -> &str {
+    queue.split_once('@').map_or("", |(_, host)| host)
 }
 
 /// What `qacct -j` printed; of a task that was begun several times the last counts.

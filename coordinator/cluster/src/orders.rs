@@ -6,7 +6,6 @@
 //! ```text
 //! arrays/NAME/order.json     what is to be rendered
 //! arrays/NAME/id             the queue's number of the array, once it was submitted
-//! arrays/NAME/had.json       how much of each task's file the coordinator had when it asked last
 //! arrays/NAME/TASK.blocks    finished blocks, one after the other (`wire::spool`)
 //! scenes/DIGEST              scene descriptions and assets
 //! ```
@@ -198,6 +197,9 @@ pub struct Wants {
     pub array: String,
     /// For each task from 1 on, how many bytes of its file the coordinator has; none: no more is wanted.
     pub offsets: Vec<Option<u64>>,
+    /// Blocks of each task that are not wanted, though they may lie beyond that; nothing where there are none of any.
+    #[serde(default)]
+    pub but: Vec<Vec<[u32; 4]>>,
 }
 
 /// `del`: end what is live of these, whole arrays or single tasks.
@@ -238,20 +240,6 @@ pub struct SeenArray {
     pub order: Option<Order>,
     /// Its tasks, from number 1 on.
     pub tasks: Vec<SeenTask>,
-    /// What a coordinator had of each when it asked last, where the order is told.
-    #[serde(default)]
-    pub had: Vec<Had>,
-}
-
-/// What a coordinator had of a task: bytes of its file, and the blocks in them.
-#[derive(Clone, PartialEq, Eq, Debug, Default, Serialize, Deserialize)]
-pub struct Had(pub u64, pub Vec<[u32; 4]>);
-
-impl Had {
-    /// The blocks.
-    pub fn blocks(&self) -> impl Iterator<Item = Rect> {
-        self.1.iter().copied().map(rect)
-    }
 }
 
 /// How a task stands, and how many bytes its file has.
@@ -266,6 +254,8 @@ pub enum Stands {
     Waits,
     /// It runs, or is being ended.
     Runs,
+    /// The queue shows it as running, on a host of which it hears nothing.
+    Away,
     /// It will not go on.
     Ended,
 }

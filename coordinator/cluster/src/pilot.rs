@@ -184,6 +184,11 @@ impl Pilot {
         }
     }
 
+    /// The site's settings, by what its queue says now.
+    pub fn settle(&mut self, settings: Settings) {
+        self.settings = settings;
+    }
+
     /// How it stands.
     pub fn standing(&self) -> &Standing {
         &self.standing
@@ -210,6 +215,7 @@ impl Pilot {
         let waits =
             |state: &TaskState| matches!(state, TaskState::Waiting { .. } | TaskState::Held { .. });
         let waiting = count(&waits);
+        // Who is on a host that is gone renders nothing: another takes its place.
         let running = count(&|state| matches!(state, TaskState::Running { .. }));
         let target = self.target(wanted);
         self.standing.waiting = waiting;
@@ -366,6 +372,10 @@ impl Pilot {
             TaskState::Held { why } => {
                 Some(format!("allocation {} waits for help: {why}", task.id))
             }
+            TaskState::Away { host } => Some(format!(
+                "allocation {} is on {host}, of which the queue hears nothing: another takes its place",
+                task.id
+            )),
             _ => None,
         });
         if self.failures == 0 && !self.stopped {

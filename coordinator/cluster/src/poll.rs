@@ -5,16 +5,18 @@
 //! not brought all its blocks gives its tile back, so that the rest is leased anew (thesis §C.5); after three tries
 //! without a block a tile fails; after a refusal nothing is submitted for a while, longer each time.
 
+mod before;
 mod held;
 mod settings;
+mod submit;
 #[cfg(test)]
 mod tests;
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use model::{AttemptId, Begun, Digest, ImageRef, Lease, Rect, Running, Span, Timestamp};
+use model::{AttemptId, Digest, ImageRef, Lease, Rect, Running, Span, Timestamp};
 
-use crate::orders::{Order, Seen, SeenArray, Stands, TaskOrder, Wants};
+use crate::orders::{Order, Seen, SeenArray, Stands, Wants, edges};
 
 use held::{Array, History, Tile};
 pub use settings::{ARRAY_TASKS, Settings};
@@ -22,17 +24,12 @@ pub use settings::{ARRAY_TASKS, Settings};
 /// Tries in a row that brought no block, after which a tile fails.
 const TRIES_MAX: u32 = 3;
 
+/// A task whose host is gone counts as ended after so many looks in a row: a queue's daemon that was started again hears of
+/// all its hosts within a minute.
+const AWAY_LOOKS: u32 = 3;
+
 /// Images beyond those that the site's `ahead` asks for, at most.
 const RAISED_MAX: u32 = 63;
-
-/// A task asks for so many times what it is expected to take…
-const LIMIT_FACTOR: u64 = 4;
-
-/// …and so much for its start, and never for less than…
-const LIMIT_START: Span = Span::from_secs(60);
-
-/// …this.
-const LIMIT_LEAST: Span = Span::from_secs(120);
 
 /// What became of a tile is forgotten so many observations after it was last leased.
 const REMEMBERED: u64 = 1_000;
@@ -65,6 +62,15 @@ pub enum Action {
     Submit(Order),
 }
 
+/// Whether a block came for the first time.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Came {
+    /// It did.
+    First,
+    /// It was durable already, and was brought in vain.
+    Again,
+}
+
 /// How a site stands, for people.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
 pub struct Standing {
@@ -72,6 +78,8 @@ pub struct Standing {
     pub waiting: u32,
     /// Tasks that run.
     pub running: u32,
+    /// Tasks whose hosts are gone.
+    pub away: u32,
     /// What is wrong, and what to do; nothing where nothing is.
     pub trouble: Option<String>,
 }
@@ -109,6 +117,11 @@ impl Poll {
             quiet_until: Timestamp(0),
             standing: Standing::default(),
         }
+    }
+
+    /// The site's settings, by what its queue says now.
+    pub fn settle(&mut self, settings: Settings) {
+        self.settings = settings;
     }
 
     /// How it stands.
@@ -163,63 +176,6 @@ impl Poll {
         self.forget(attempt);
     }
 
-    /// Only these tiles are still the site's.
-    pub fn keeps(&mut self, live: &[AttemptId]) {
-        let live: BTreeSet<_> = live.iter().collect();
-        let gone: Vec<_> = self.tiles.keys().copied().collect();
-        for attempt in gone.into_iter().filter(|attempt| !live.contains(attempt)) {
-            self.forget(attempt);
-        }
-    }
-
-    /// Takes up what an earlier coordinator left there: what runs, and what has ended and may have brought blocks that
-    /// nobody has fetched. What only waits is not taken up, and so deleted.
-    pub fn takes_up(&mut self, seen: &Seen) -> Vec<Begun> {
-        let mut begun = Vec::new();
-        for array in &seen.arrays {
-            let Some(order) = array.order.as_ref().filter(|_| array.is_submitted) else {
-                continue;
-            };
-            if self.arrays.contains_key(&array.name) {
-                continue;
-            }
-            let mut tiles = vec![None; order.tasks.len()];
-            for (index, (task, tile)) in array.tasks.iter().zip(&mut tiles).enumerate() {
-                let number = u32::try_from(index + 1).unwrap_or(u32::MAX);
-                let has_begun = task.0 != Stands::Waits && (task.0 == Stands::Runs || task.1 > 0);
-                let Some(lease) = order.lease(number).filter(|_| has_begun) else {
-                    continue;
-                };
-                *tile = Some(lease.attempt);
-                let claim = Begun {
-                    attempt: lease.attempt,
-                    image: lease.image,
-                    tile: lease.tile,
-                };
-                let place = (array.name.clone(), number);
-                let mut taken = Tile::new(lease, Some(place));
-                if let Some(had) = array.had.get(index) {
-                    taken.inherits(had);
-                }
-                // Of one that is whole nothing more is wanted.
-                if taken.missing.is_empty() {
-                    *tile = None;
-                    continue;
-                }
-                begun.push(claim);
-                self.tiles.insert(claim.attempt, taken);
-            }
-            let found = Array {
-                tiles,
-                is_sure: true,
-                time_limit: order.time_limit,
-                deleted: BTreeSet::new(),
-            };
-            self.arrays.insert(array.name.clone(), found);
-        }
-        begun
-    }
-
     /// Arrays whose orders are known.
     pub fn known(&self) -> Vec<String> {
         self.arrays.keys().cloned().collect()
@@ -231,9 +187,22 @@ impl Poll {
             let tile = self.tiles.get(attempt.as_ref()?)?;
             Some(tile.offset)
         };
-        let wants = self.arrays.iter().map(|(name, array)| Wants {
-            array: name.clone(),
-            offsets: array.tiles.iter().map(offset).collect(),
+        let but = |attempt: &Option<AttemptId>| {
+            let tile = attempt.as_ref().and_then(|it| self.tiles.get(it));
+            tile.map_or_else(Vec::new, |tile| {
+                tile.found.iter().copied().map(edges).collect()
+            })
+        };
+        let wants = self.arrays.iter().map(|(name, array)| {
+            let but: Vec<Vec<_>> = array.tiles.iter().map(but).collect();
+            Wants {
+                array: name.clone(),
+                offsets: array.tiles.iter().map(offset).collect(),
+                but: match but.iter().all(Vec::is_empty) {
+                    true => Vec::new(),
+                    false => but,
+                },
+            }
         });
         wants
             .filter(|wants| wants.offsets.iter().any(Option::is_some))
@@ -248,13 +217,13 @@ impl Poll {
         }
     }
 
-    /// A block is durable.
-    pub fn delivered(&mut self, attempt: AttemptId, block: Rect, took: Span) {
+    /// A block is durable; answers whether it was known to be.
+    pub fn delivered(&mut self, attempt: AttemptId, block: Rect, took: Span) -> Came {
         let Some(tile) = self.tiles.get_mut(&attempt) else {
-            return;
+            return Came::Again;
         };
         if !tile.missing.remove(&block) {
-            return;
+            return Came::Again;
         }
         tile.arrived += 1;
         tile.took = tile.took + took;
@@ -267,6 +236,7 @@ impl Poll {
                 self.finished += 1;
             }
         }
+        Came::First
     }
 
     /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do.
@@ -330,7 +300,16 @@ impl Poll {
                     tile.place = None;
                 }
                 (None | Some(Stands::Ended), None) => ended.push((attempt, name, task)),
-                (Some(stands), None) => tile.runs = stands == Stands::Runs,
+                (Some(stands), None) => {
+                    tile.runs = stands == Stands::Runs;
+                    tile.away = match stands {
+                        Stands::Away => tile.away + 1,
+                        _ => 0,
+                    };
+                    if tile.away >= AWAY_LOOKS {
+                        ended.push((attempt, name, task));
+                    }
+                }
             }
         }
         let mut back = Vec::new();
@@ -343,6 +322,8 @@ impl Poll {
             history.observation = self.observations;
             history.limit = self.arrays.get(&array).and_then(|array| array.time_limit);
             match tile.arrived - tile.inherited {
+                // It is nobody's fault but its host's.
+                0 if tile.away > 0 => {}
                 0 => history.tries += 1,
                 blocks => {
                     history.tries = 0;
@@ -369,8 +350,9 @@ impl Poll {
     /// Ends and removes what nobody needs, and counts what is live.
     fn tidy(&mut self, seen: &BTreeMap<&str, &SeenArray>, actions: &mut Vec<Action>) {
         let (mut delete, mut remove) = (Vec::new(), Vec::new());
-        let (mut waiting, mut running) = (0, 0);
+        let (mut waiting, mut running, mut away) = (0, 0, 0);
         for (&name, there) in seen {
+            away += count(there, Stands::Away);
             waiting += count(there, Stands::Waits);
             running += count(there, Stands::Runs);
             let array = self.arrays.entry(name.to_owned()).or_insert_with(|| Array {
@@ -385,12 +367,21 @@ impl Poll {
             let live = (1..)
                 .zip(&there.tasks)
                 .filter(|(_, task)| task.0 != Stands::Ended);
-            let live: Vec<u32> = live.map(|(number, _)| number).collect();
+            let live: Vec<(u32, Stands)> = live.map(|(number, task)| (number, task.0)).collect();
             match (is_wanted, live.is_empty()) {
                 (false, true) => remove.push(name.to_owned()),
-                (false, false) => delete.push((name.to_owned(), None)),
+                (false, false) => {
+                    // Of those that are away nothing comes of asking twice.
+                    let mut is_new = false;
+                    for &(task, stands) in &live {
+                        is_new |= array.deleted.insert(task) || stands != Stands::Away;
+                    }
+                    if is_new {
+                        delete.push((name.to_owned(), None));
+                    }
+                }
                 (true, _) => {
-                    for task in live {
+                    for (task, _) in live {
                         if array.attempt(task).is_none() && array.deleted.insert(task) {
                             delete.push((name.to_owned(), Some(task)));
                         }
@@ -402,84 +393,13 @@ impl Poll {
             .retain(|name, _| seen.contains_key(name.as_str()));
         self.standing.waiting = waiting;
         self.standing.running = running;
+        self.standing.away = away;
         if !delete.is_empty() {
             actions.push(Action::Delete(delete));
         }
         if !remove.is_empty() {
             actions.push(Action::Remove(remove));
         }
-    }
-
-    /// Puts what is leased and in no array into new ones, an image into as few as it takes.
-    fn submit(&mut self, actions: &mut Vec<Action>) {
-        let mut images = BTreeMap::<(ImageRef, Digest), Vec<AttemptId>>::new();
-        for (&attempt, tile) in self.tiles.iter().filter(|(_, tile)| tile.place.is_none()) {
-            let key = (tile.lease.image, tile.lease.scene);
-            images.entry(key).or_default().push(attempt);
-        }
-        let array_max = usize::try_from(self.settings.array_max).unwrap_or(usize::MAX);
-        for ((image, scene), attempts) in images {
-            for attempts in attempts.chunks(array_max.max(1)) {
-                self.number += 1;
-                let name = format!("{}{}", self.settings.names, self.number);
-                let time_limit = self.limit(attempts);
-                let mut tasks = Vec::new();
-                for (number, attempt) in (1..).zip(attempts) {
-                    if let Some(tile) = self.tiles.get_mut(attempt) {
-                        tile.place = Some((name.clone(), number));
-                        tile.runs = false;
-                        tasks.push(TaskOrder::from(&tile.lease));
-                    }
-                }
-                let array = Array {
-                    tiles: attempts.iter().copied().map(Some).collect(),
-                    is_sure: true,
-                    time_limit,
-                    deleted: BTreeSet::new(),
-                };
-                self.arrays.insert(name.clone(), array);
-                actions.push(Action::Submit(Order {
-                    name,
-                    scene: scene.to_string(),
-                    job: image.job.0,
-                    image: image.image.0,
-                    revision: self.settings.revision.0,
-                    threads: self.settings.threads,
-                    running_max: self.settings.running_max,
-                    time_limit,
-                    tasks,
-                }));
-            }
-        }
-    }
-
-    /// How long a task of these tiles may run: by the site's word, else by what is known of the dearest.
-    fn limit(&self, attempts: &[AttemptId]) -> Option<Span> {
-        let threads = u64::from(self.settings.threads.max(1));
-        let tiles = attempts
-            .iter()
-            .filter_map(|attempt| self.tiles.get(attempt));
-        let one = |tile: &Tile| {
-            let history = self.histories.get(&(tile.lease.image, tile.lease.tile));
-            let measured = history.map_or(Span(0), |history| history.block);
-            let expected = match measured {
-                Span(0) => tile.lease.expected,
-                block => block.times(tile.missing.len() as u64),
-            };
-            let enough = Span(expected.0 / threads).times(LIMIT_FACTOR) + LIMIT_START;
-            let enough = (expected > Span(0)).then_some(enough.max(LIMIT_LEAST));
-            // What was killed without a block needs more than it had.
-            let last = history.filter(|history| history.tries > 0);
-            let longer = last
-                .and_then(|history| history.limit)
-                .map(|limit| limit.times(2));
-            enough.max(longer)
-        };
-        let limit = self
-            .settings
-            .time_limit
-            .or_else(|| tiles.filter_map(one).max())?;
-        Some(self.settings.time_max.map_or(limit, |most| limit.min(most)))
     }
 
     /// A tile is the site's no more.

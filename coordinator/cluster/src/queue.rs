@@ -156,6 +156,11 @@ pub enum TaskState {
         /// On which host; empty where the queue does not say.
         host: String,
     },
+    /// The queue shows it as running, on a host of which it hears nothing any more.
+    Away {
+        /// Which.
+        host: String,
+    },
     /// It is being ended.
     Ending,
     /// It ended by itself, and well.
@@ -177,11 +182,15 @@ pub enum TaskState {
 }
 
 impl TaskState {
-    /// Whether it waits or runs.
+    /// Whether the queue counts it as waiting or running.
     pub fn is_live(&self) -> bool {
         matches!(
             self,
-            Self::Waiting { .. } | Self::Held { .. } | Self::Running { .. } | Self::Ending
+            Self::Waiting { .. }
+                | Self::Held { .. }
+                | Self::Running { .. }
+                | Self::Away { .. }
+                | Self::Ending
         )
     }
 }

@@ -131,7 +131,11 @@ impl Sched {
             if !held.contains(&number) {
                 self.end_attempt(number);
             } else if let Some(attempt) = self.attempts.get(number) {
-                self.reconsider(attempt.image, attempt.tile);
+                let (image, tile) = (attempt.image, attempt.tile);
+                if attempt.phase == Phase::Running && self.workers[place].offer.queue.is_some() {
+                    self.progress(number);
+                }
+                self.reconsider(image, tile);
             }
         }
     }
@@ -218,10 +222,30 @@ impl Sched {
         }
         worker.link = Link::Closed;
         let live = worker.live.clone();
+        if let Some(queue) = worker.offer.queue {
+            let due = Some(self.now + queue.patience);
+            self.timers.set(Timer::Lost(place), &mut worker.lost, due);
+        }
         self.worker_changed(place);
         for number in live {
+            self.is_out_of_sight(number);
             let attempt = &self.attempts[number];
             self.reconsider(attempt.image, attempt.tile);
+        }
+    }
+
+    /// What a queue has begun goes on while nobody hears of it: it is not stuck for that.
+    fn is_out_of_sight(&mut self, number: u64) {
+        let Some(attempt) = self.attempts.get_mut(number) else {
+            return;
+        };
+        let Some(queue) = self.workers[attempt.worker].offer.queue else {
+            return;
+        };
+        if attempt.phase == Phase::Running {
+            let due = Some(self.now + queue.patience + attempt.limit + queue.lag);
+            self.timers
+                .set(Timer::Stuck(number), &mut attempt.stuck, due);
         }
     }
 

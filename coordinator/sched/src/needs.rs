@@ -47,6 +47,8 @@ pub struct Queue {
     pub max_array_size: u64,
     /// By how much what is heard of its tiles may be late: it is polled (§C.3.4).
     pub lag: Span,
+    /// How long what it has begun stays its own while its link is closed: there it goes on meanwhile.
+    pub patience: Span,
 }
 
 impl Needs {

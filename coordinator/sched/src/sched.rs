@@ -248,6 +248,15 @@ impl Sched {
         (self.workers[live.worker].id == worker).then_some(number)
     }
 
+    /// The blocks of a worker's tile that are not durable, whoever brings them; `None` where the tile is not its own.
+    pub fn missing(&self, worker: WorkerId, attempt: AttemptId) -> Option<Vec<Rect>> {
+        let attempt = self.attempts.get(self.owned(worker, attempt)?)?;
+        let job = self.jobs.get(&attempt.image.job)?;
+        let work = job.work.get(&job.place(attempt.image.image)?)?;
+        let blocks = attempt.rect.blocks();
+        Some(blocks.filter(|&block| !work.pixels.covers(block)).collect())
+    }
+
     /// What its worker calls an attempt.
     pub(crate) fn attempt_id(&self, number: u64) -> AttemptId {
         let name = self.attempts.get(number).and_then(|attempt| attempt.name);

@@ -9,7 +9,7 @@ use sched::{
     BlockRef, Effect, Event, ImageState, LinkId, Offer, Queue, RevokeReason, Submission, TileShape,
     Verdict, WhyWorker,
 };
-use situation::{EPOCH, Farm, farm, image_ref, offer, state, submission, worker};
+use situation::{EPOCH, Farm, farm, forget, image_ref, offer, state, submission, worker};
 
 const SITE: u64 = 1;
 const LOCAL: u64 = 2;
@@ -19,6 +19,7 @@ const SNOWDON: Queue = Queue {
     min_tile_pixels: 5_000,
     max_array_size: 75_000,
     lag: Span::from_secs(300),
+    patience: Span::from_secs(3_600),
 };
 
 /// A job of so many images of 800×600 pixels, by time.
@@ -237,6 +238,54 @@ fn a_queue_that_was_lost_leaves_its_image_to_others() {
     // It is not heard of any more.
     farm.waits_with_heartbeats(Span::from_secs(5), LOCAL, &[]);
     assert_eq!(leases(&mut farm, LOCAL).keys().collect::<Vec<_>>(), [&0]);
+}
+
+#[test]
+fn what_a_queue_renders_out_of_reach_counts_when_it_is_back_within_its_patience() {
+    for (away, counts) in [(3_599, true), (3_601, false)] {
+        let mut farm = farm();
+        job(&mut farm, 1);
+        site(&mut farm, SNOWDON, 1);
+        let ours = leases(&mut farm, SITE)[&0].clone();
+        let held: Vec<_> = ours.iter().map(|lease| lease.attempt).collect();
+        farm.heartbeat(SITE, &[(held[0].number, 0)]);
+        farm.is_told(Event::LinkClosed {
+            worker: worker(SITE),
+            link: LinkId(1_000),
+        });
+        // Whoever is there may have of it meanwhile.
+        farm.worker(LOCAL, 1);
+        let theirs = leases(&mut farm, LOCAL)[&0].clone();
+        store(
+            &mut farm,
+            LOCAL,
+            (theirs[0].attempt, 0),
+            theirs[0].tile.blocks().next().unwrap(),
+        );
+        farm.waits_with_heartbeats(Span::from_secs(away), LOCAL, &[]);
+        let was_lost = |effect: &Effect| *effect == forget(SITE);
+        assert_eq!(farm.never_mind().iter().any(was_lost), !counts);
+        farm.is_told(Event::WorkerJoined {
+            worker: worker(SITE),
+            link: LinkId(1_001),
+            offer: Offer {
+                threads: 4,
+                queue: Some(SNOWDON),
+                ..offer()
+            },
+            held,
+            begun: vec![],
+        });
+        let last = ours.last().unwrap();
+        let missing = farm.sched.missing(worker(SITE), last.attempt);
+        assert_eq!(missing.is_some(), counts);
+        let before = farm.sched.image(image_ref(0)).unwrap().pixels_done;
+        for rect in missing.unwrap_or_default() {
+            store(&mut farm, SITE, (last.attempt, 0), rect);
+        }
+        let more = farm.sched.image(image_ref(0)).unwrap().pixels_done - before;
+        assert_eq!(more > 0, counts);
+    }
 }
 
 #[test]

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytes::Bytes;
-use model::{Digest, ImageNumber, ImageRef, JobId, Revision, Span, WorkerId};
+use model::{AttemptId, Digest, ImageNumber, ImageRef, JobId, Rect, Revision, Span, WorkerId};
 use sched::{BlockRef, Command, Event, LinkId, Offer};
 use store::Entry;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, broadcast, mpsc, oneshot};
@@ -106,6 +106,8 @@ pub(crate) enum Query {
     Why(WhyOf, Reply<proto::WhyReply>),
     /// The farm.
     Info(Reply<proto::FarmInfo>),
+    /// Which blocks of a worker's tiles are not durable; of a tile that is not its own nothing is said.
+    Missing(WorkerId, Vec<AttemptId>, Reply<Vec<(AttemptId, Vec<Rect>)>>),
     /// What is left to do for workers of a site, that offer so much and have this label.
     Wanted(Offer, String, Reply<cluster::pilot::Wanted>),
 }
@@ -206,7 +208,7 @@ pub(crate) struct Greeting {
     pub(crate) threads: u32,
     /// How it takes tiles where it stands for a cluster's queue.
     pub(crate) queue: Option<sched::Queue>,
-    pub(crate) held: Vec<model::AttemptId>,
+    pub(crate) held: Vec<AttemptId>,
     pub(crate) begun: Vec<model::Begun>,
     pub(crate) about: AboutWorker,
 }

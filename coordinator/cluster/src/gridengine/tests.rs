@@ -2,6 +2,7 @@ use super::*;
 use crate::sites;
 
 const QSTAT: &str = include_str!("../../tests/recorded/sge-8.1.9-qstat.xml");
+const LOST: &str = include_str!("../../tests/recorded/sge-8.1.9-qstat-lost.xml");
 const ERRORS: &str = include_str!("../../tests/recorded/sge-8.1.9-qstat-errors.xml");
 const QACCT: &str = include_str!("../../tests/recorded/sge-8.1.9-qacct.txt");
 
@@ -21,6 +22,21 @@ fn jobs_of_grid_engine_8_1_9() {
             TaskState::Waiting { why: String::new() }
         );
     }
+}
+
+#[test]
+fn tasks_of_a_host_that_lost_its_power_are_away_until_it_answers() {
+    let tasks = tasks(LOST, "flyby-ab-").unwrap();
+    let state = |number| {
+        let id = TaskId::task("1", number);
+        let found = tasks.iter().find(|task| task.id == id);
+        found.unwrap().state.clone()
+    };
+    let away = TaskState::Away { host: "ge2".into() };
+    let running = TaskState::Running { host: "ge1".into() };
+    // The third was deleted, which needs its host's answer.
+    assert_eq!((state(1), state(4)), (running.clone(), running));
+    assert_eq!((state(2), state(3)), (away.clone(), away));
 }
 
 #[test]

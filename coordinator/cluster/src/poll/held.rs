@@ -4,21 +4,23 @@ use std::collections::BTreeSet;
 
 use model::{AttemptId, Lease, Rect, Span};
 
-use crate::orders::Had;
-
 /// A tile that is leased to the site.
 #[derive(Clone, Debug)]
 pub(super) struct Tile {
     pub(super) lease: Lease,
     pub(super) missing: BTreeSet<Rect>,
-    /// Blocks that have arrived, those that an earlier coordinator had among them.
+    /// Blocks that have arrived, those that were there before it was taken up among them.
     pub(super) arrived: u32,
     pub(super) inherited: u32,
+    /// Blocks that were durable when it was taken up, and may lie in its file all the same.
+    pub(super) found: Vec<Rect>,
     /// How long they took one thread.
     pub(super) took: Span,
     /// Bytes of its file that are done with.
     pub(super) offset: u64,
     pub(super) runs: bool,
+    /// In so many looks in a row its host was gone.
+    pub(super) away: u32,
     pub(super) place: Option<(String, u32)>,
 }
 
@@ -54,20 +56,22 @@ impl Tile {
             lease,
             arrived: 0,
             inherited: 0,
+            found: Vec::new(),
             took: Span(0),
             offset: 0,
             runs: false,
+            away: 0,
             place,
         }
     }
 
-    /// An earlier coordinator had this of it already.
-    pub(super) fn inherits(&mut self, had: &Had) {
-        self.offset = had.0;
-        for block in had.blocks() {
-            self.inherited += u32::from(self.missing.remove(&block));
-        }
-        self.arrived = self.inherited;
+    /// Only these blocks are still wanted of it.
+    pub(super) fn lacks(&mut self, missing: &BTreeSet<Rect>) {
+        self.found = self.missing.difference(missing).copied().collect();
+        self.missing.retain(|block| missing.contains(block));
+        let found = u32::try_from(self.found.len()).unwrap_or(u32::MAX);
+        self.inherited += found;
+        self.arrived += found;
     }
 }
 

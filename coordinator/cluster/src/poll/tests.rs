@@ -2,8 +2,9 @@
 
 use model::{Epoch, ImageNumber, JobId, Revision};
 
+use super::submit::LIMIT_LEAST;
 use super::*;
-use crate::orders::{Had, SeenTask};
+use crate::orders::SeenTask;
 
 const TAKES: Span = Span::from_secs(10);
 
@@ -68,7 +69,6 @@ impl There {
                     is_submitted: true,
                     order: Some(order.clone()),
                     tasks: vec![SeenTask(Stands::Waits, 0); order.tasks.len()],
-                    had: Vec::new(),
                 }),
                 Action::Remove(names) => self.seen.arrays.retain(|a| !names.contains(&a.name)),
                 _ => {}
@@ -235,7 +235,7 @@ fn what_ran_is_taken_up_and_what_waited_is_deleted() {
 }
 
 #[test]
-fn what_was_fetched_before_is_not_fetched_again() {
+fn what_is_durable_already_is_not_fetched_again() {
     let mut before = there();
     before.poll.leased(lease(0, 0));
     before.poll.leased(lease(1, 0));
@@ -243,23 +243,43 @@ fn what_was_fetched_before_is_not_fetched_again() {
     before.are(Stands::Ended);
     let mut now = there();
     now.seen = before.seen;
-    let blocks = |number: u64, count| {
-        let tile = lease(number, 0).tile;
-        tile.blocks()
-            .take(count)
-            .map(crate::orders::edges)
-            .collect()
-    };
-    let array = &mut now.seen.arrays[0];
-    array.tasks = vec![SeenTask(Stands::Ended, 99); 2];
-    array.had = vec![Had(70, blocks(0, 1)), Had(99, blocks(1, 2))];
+    now.seen.arrays[0].tasks = vec![SeenTask(Stands::Ended, 99); 2];
     let begun = now.poll.takes_up(&now.seen);
-    assert_eq!(begun.len(), 1);
-    now.poll.keeps(&[attempt(0)]);
-    assert_eq!(now.poll.wants()[0].offsets, [Some(70), None]);
-    let rest = lease(0, 0).tile.blocks().nth(1).unwrap();
-    now.poll.delivered(attempt(0), rest, TAKES);
+    assert_eq!(begun.len(), 2);
+    let blocks: Vec<Rect> = lease(0, 0).tile.blocks().collect();
+    now.poll.keeps(&[attempt(0), attempt(1)]);
+    now.poll.lacks(attempt(0), &blocks[1..]);
+    now.poll.lacks(attempt(1), &[]);
+    assert_eq!(now.poll.held(), [attempt(0)]);
+    let wants = now.poll.wants().remove(0);
+    assert_eq!(wants.offsets, [Some(0), None]);
+    assert_eq!(wants.but, [vec![edges(blocks[0])], vec![]]);
+    let came = |now: &mut There, block| now.poll.delivered(attempt(0), block, TAKES);
+    assert_eq!(came(&mut now, blocks[0]), Came::Again);
+    assert_eq!(came(&mut now, blocks[1]), Came::First);
     assert!(now.poll.held().is_empty());
+}
+
+#[test]
+fn a_task_whose_host_is_gone_is_given_back_by_nobody_s_fault() {
+    let mut there = there();
+    for round in 0..5_u64 {
+        let number = 100 * round;
+        there.poll.leased(lease(number, 0));
+        let order = there.submits().remove(0);
+        there.are(Stands::Away);
+        for _ in 1..AWAY_LOOKS {
+            assert_eq!(there.looks(), []);
+        }
+        assert!(there.poll.standing().away > 0);
+        // It is not deleted again and again: nobody there hears of it.
+        let back = Action::GiveBack(vec![attempt(number)]);
+        let delete = Action::Delete(vec![(order.name.clone(), None)]);
+        assert_eq!(there.looks(), [back, delete]);
+        assert_eq!(there.looks(), []);
+        there.are(Stands::Ended);
+        assert_eq!(there.looks(), [Action::Remove(vec![order.name])]);
+    }
 }
 
 #[test]

@@ -57,6 +57,7 @@ struct SiteText {
     program: Option<Spanned<String>>,
     template: Option<Spanned<String>>,
     idle: Option<Spanned<String>>,
+    patience: Option<Spanned<String>>,
     coordinator: Option<Spanned<String>>,
     #[serde(default)]
     cancelled: Cancelled,
@@ -233,6 +234,9 @@ impl Check<'_> {
             idle: self
                 .span(text.idle.as_ref(), "1 s", "1 d")
                 .unwrap_or(Span::from_secs(120)),
+            patience: self
+                .span(text.patience.as_ref(), "1 s", "7 d")
+                .unwrap_or(Span::from_secs(3_600)),
             coordinator: self.dial(text.coordinator.as_ref()),
             cancelled: text.cancelled,
             name: self.name(name),

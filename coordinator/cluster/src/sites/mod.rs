@@ -69,6 +69,9 @@ pub struct Site {
     /// A worker without a tile for so long gives its allocation back.
     #[serde(with = "microseconds")]
     pub idle: Span,
+    /// In poll mode what the site has begun stays its own for so long while it cannot be reached.
+    #[serde(with = "microseconds")]
+    pub patience: Span,
     /// Where the site's workers reach the coordinator; `None`: where it listens.
     pub coordinator: Option<String>,
     /// What becomes of an allocation that somebody deleted.

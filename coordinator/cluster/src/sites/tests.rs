@@ -42,7 +42,7 @@ fn mistakes_have_file_line_column_and_help() {
     assert_eq!(
         mistakes("[site.a]\nkind = 'local'\nmax_runing = 3\n"),
         [
-            "s.toml:3:1: unknown field `max_runing`, expected one of `kind`, `mode`, `address`, `ssh_options`, `setup`, `min_tile_pixels`, `max_array_size`, `max_running`, `poll`, `ahead`, `time_limit`, `queue`, `account`, `parallel_environment`, `submit`, `labels`, `threads`, `memory`, `folder`, `program`, `template`, `idle`, `coordinator`, `cancelled` (did you mean `max_running`?)"
+            "s.toml:3:1: unknown field `max_runing`, expected one of `kind`, `mode`, `address`, `ssh_options`, `setup`, `min_tile_pixels`, `max_array_size`, `max_running`, `poll`, `ahead`, `time_limit`, `queue`, `account`, `parallel_environment`, `submit`, `labels`, `threads`, `memory`, `folder`, `program`, `template`, `idle`, `patience`, `coordinator`, `cancelled` (did you mean `max_running`?)"
         ]
     );
     let said = mistakes("[site.a]\nkind = 'pbs'\n");

@@ -62,6 +62,12 @@ impl Shell {
             Query::Info(reply) => {
                 let _ = reply.send(Ok(self.info()));
             }
+            Query::Missing(worker, attempts, reply) => {
+                let missing = attempts.into_iter();
+                let missing = missing
+                    .filter_map(|attempt| Some((attempt, self.sched.missing(worker, attempt)?)));
+                let _ = reply.send(Ok(missing.collect()));
+            }
             Query::Wanted(offer, label, reply) => {
                 let _ = reply.send(Ok(self.wanted(&offer, &label)));
             }

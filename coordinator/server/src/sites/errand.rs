@@ -159,10 +159,8 @@ impl Errand {
         if mode == Mode::Poll {
             return Ok(Found::Poll(limits));
         }
-        let names = format!("{}{}-", self.camp.prefix(), self.epoch.0);
-        let settings = Settings::of(site, &limits, names);
         Ok(Found::Pilot(Box::new(Known {
-            pilot: Pilot::new(settings),
+            pilot: Pilot::new(self.settings(&limits)),
             limits,
             is_empty: false,
             is_ready: false,
@@ -219,8 +217,18 @@ impl Errand {
                 tracing::warn!(site, name, tasks, "{words}");
                 known.is_ready = false;
                 known.pilot.refused(now, words);
+                // Its limits may be others than they were.
+                if let Ok(limits) = self.camp.queue.limits() {
+                    known.pilot.settle(self.settings(&limits));
+                    known.limits = limits;
+                }
             }
         }
+    }
+
+    fn settings(&self, limits: &Limits) -> Settings {
+        let names = format!("{}{}-", self.camp.prefix(), self.epoch.0);
+        Settings::of(&self.camp.site, limits, names)
     }
 
     fn array(&self, limits: &Limits, name: &str, tasks: u32) -> Array {

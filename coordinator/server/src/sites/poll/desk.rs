@@ -36,6 +36,8 @@ pub(super) struct Fetched {
     pub(super) task: u32,
     /// Where it ends in the file.
     pub(super) end: u64,
+    /// How many bytes it has.
+    pub(super) bytes: u64,
     /// The block; `None` where it was damaged.
     pub(super) delivery: Option<Delivery>,
 }
@@ -46,6 +48,19 @@ impl<'a> Desk<'a> {
             there: There::of(camp)?,
             camp,
         })
+    }
+
+    /// Asks how everything stands, for somebody who cannot take blocks yet.
+    pub(super) fn see(&self, poll: &Poll) -> Result<Seen, ClusterError> {
+        let request = Look {
+            there: self.there.clone(),
+            known: poll.known(),
+            wants: Vec::new(),
+        };
+        let attempt = "looking at arrays";
+        let said = self.ask(attempt, "ls", &request)?;
+        let line = said.lines().next().unwrap_or_default();
+        serde_json::from_str(line).map_err(|error| nonsense(attempt, &error.to_string()))
     }
 
     /// Asks how everything stands, and for the blocks that are there and wanted, in one call.
@@ -84,6 +99,7 @@ impl<'a> Desk<'a> {
                 array: wants.array.clone(),
                 task: frame.task,
                 end: frame.end,
+                bytes: frame.entry.len() as u64,
                 delivery: match spool::read(frame.entry) {
                     Entry::Block(delivery, _) => Some(*delivery),
                     Entry::Damaged(_) | Entry::End => None,

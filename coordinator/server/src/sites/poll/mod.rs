@@ -9,11 +9,11 @@ use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
 use cluster::orders::{End, Order, Seen};
-use cluster::poll::{Action, Poll, Settings};
+use cluster::poll::{Action, Came, Poll, Settings};
 use cluster::{ClusterError, Limits, survey};
 use model::{AttemptId, Lease, Span, Timestamp, WorkerId};
 use sched::{Event, Queue};
-use tokio::sync::mpsc;
+use tokio::sync::{mpsc, oneshot};
 use wire::proto::control_down::Message;
 
 use self::desk::{Desk, Looked};
@@ -21,19 +21,20 @@ use self::line::{Became, Cut, Hello, Line};
 use self::scenes::Scenes;
 use super::errand::{Errand, Stopping, program_makes, unix_ms, words};
 use super::rest;
-use crate::input::AboutWorker;
+use crate::input::{AboutWorker, Input, Query};
 
 /// After so many looks in a row that failed, others may have the site's tiles.
 const MISSED_MAX: u32 = 4;
 
-/// The longest pause after a site could not be reached several times in a row.
+/// The longest pause after a site could not be reached more often than that.
 const PAUSE_LONGEST: Duration = Duration::from_secs(300);
 
 /// The least time between two looks, however often there may be something new.
 const LOOK_LEAST: Duration = Duration::from_secs(1);
 
-/// How late what is heard of a task may be, beside two polls: file systems of clusters tell a login node late.
-const SLACK: Span = Span::from_secs(60);
+/// How late what is heard of a task may be, beside the polls that may be missed: file systems of clusters tell a login node
+/// late, and each miss takes a while by itself.
+const SLACK: Span = Span::from_secs(120);
 
 /// Most threads that are told to the scheduler.
 const THREADS_MAX: u32 = 4_096;
@@ -80,12 +81,9 @@ pub(super) struct Poller<'a> {
 
 impl<'a> Poller<'a> {
     pub(super) fn new(errand: &'a Errand, limits: Limits) -> Result<Self, ClusterError> {
-        let camp = &errand.camp;
-        let names = format!("{}{}-", camp.prefix(), errand.epoch.0);
-        let settings = Settings::of(&camp.site, &limits, names, errand.revision);
         Ok(Self {
-            desk: Desk::new(camp)?,
-            poll: Poll::new(settings),
+            desk: Desk::new(&errand.camp)?,
+            poll: Poll::new(settings(errand, &limits)),
             limits,
             scenes: Scenes::default(),
             line: None,
@@ -125,7 +123,7 @@ impl<'a> Poller<'a> {
                     {
                         line.close();
                     }
-                    let longer = poll.saturating_mul(1 << missed.min(8));
+                    let longer = poll.saturating_mul(1 << missed.saturating_sub(MISSED_MAX).min(8));
                     longer.min(PAUSE_LONGEST).max(poll)
                 }
             };
@@ -219,12 +217,9 @@ impl<'a> Poller<'a> {
     /// Joins the farm, with what the site still has of before.
     fn connect(&mut self) -> Result<(), Trouble> {
         let site = &self.errand.camp.site;
-        let found = self.desk.look(&self.poll)?;
-        found.end?;
-        let begun = found.seen.as_ref().map_or_else(Vec::new, |seen| {
-            self.scenes.are(&seen.files);
-            self.poll.takes_up(seen)
-        });
+        let seen = self.desk.see(&self.poll)?;
+        self.scenes.are(&seen.files);
+        let begun = self.poll.takes_up(&seen);
         let slots = [
             site.max_running,
             self.limits.running,
@@ -240,7 +235,8 @@ impl<'a> Poller<'a> {
             queue: Queue {
                 min_tile_pixels: site.min_tile_pixels,
                 max_array_size: array_max.map_or(cluster::poll::ARRAY_TASKS.into(), u64::from),
-                lag: site.poll.times(2) + SLACK,
+                lag: site.poll.times(u64::from(MISSED_MAX) + 1) + SLACK,
+                patience: site.patience,
             },
             about: AboutWorker {
                 name: site.label(),
@@ -256,6 +252,17 @@ impl<'a> Poller<'a> {
         let (inputs, gates) = (self.errand.inputs.clone(), self.errand.gates.clone());
         let (line, live) = Line::open(hello, inputs, gates, self.errand.runtime.clone())?;
         self.poll.keeps(&live);
+        // Others may have brought some of it, or a coordinator that was here before.
+        let (reply, answer) = oneshot::channel();
+        let query = Query::Missing(line.worker(), self.poll.held(), reply);
+        let asked = self.errand.inputs.blocking_send(Input::Ask(query));
+        asked.map_err(|_| Cut::Stopping)?;
+        let Ok(Ok(missing)) = answer.blocking_recv() else {
+            return Err(Cut::Stopping.into());
+        };
+        for (attempt, missing) in missing {
+            self.poll.lacks(attempt, &missing);
+        }
         self.line = Some(line);
         self.credit = 0;
         self.wants()
@@ -325,13 +332,20 @@ impl<'a> Poller<'a> {
             for block in &blocks {
                 deliveries.extend(block.delivery.clone());
             }
+            let mut again = 0;
             if let Some(line) = &mut self.line {
                 for (attempt, rect, took, became) in line.deliver(&deliveries)? {
                     if became == Became::Durable {
-                        self.poll.delivered(attempt, rect, took);
+                        again += u64::from(self.poll.delivered(attempt, rect, took) == Came::Again);
                     }
                 }
             }
+            let bytes: u64 = blocks.iter().map(|block| block.bytes).sum();
+            self.errand.board.change(self.name(), |site| {
+                site.fetched_blocks += blocks.len() as u64;
+                site.fetched_bytes += bytes;
+                site.fetched_again += again;
+            });
             // Only now: all before these is durable, or nobody wants it.
             for block in &blocks {
                 self.poll.is_done_to(&block.array, block.task, block.end);
@@ -396,6 +410,11 @@ impl<'a> Poller<'a> {
                 self.is_ready = false;
                 let now = self.now();
                 self.poll.refused(now, name, words);
+                // Its limits may be others than they were.
+                if let Ok(limits) = self.errand.camp.queue.limits() {
+                    self.poll.settle(settings(self.errand, &limits));
+                    self.limits = limits;
+                }
             }
             Err(line) => return Err(line),
         }
@@ -426,7 +445,13 @@ impl<'a> Poller<'a> {
 
     fn show(&self, trouble: Option<String>) {
         let standing = self.poll.standing();
-        let trouble = trouble.or_else(|| standing.trouble.clone());
+        let away = (standing.away > 0).then(|| {
+            format!(
+                "the queue hears nothing of the hosts of {} tasks: others render what they leave",
+                standing.away
+            )
+        });
+        let trouble = trouble.or_else(|| standing.trouble.clone()).or(away);
         let wanted = u32::try_from(self.poll.held().len()).unwrap_or(u32::MAX);
         self.errand.board.change(self.name(), |site| {
             site.waiting = standing.waiting;
@@ -435,4 +460,10 @@ impl<'a> Poller<'a> {
             site.trouble = trouble.unwrap_or_default();
         });
     }
+}
+
+/// What does not change of a site, by what its queue says.
+fn settings(errand: &Errand, limits: &Limits) -> Settings {
+    let names = format!("{}{}-", errand.camp.prefix(), errand.epoch.0);
+    Settings::of(&errand.camp.site, limits, names, errand.revision)
 }
