@@ -22,12 +22,12 @@ fn wait_transfer(flight: &Flight) {
         lines.iter().any(|line| line.contains("site-agent get"))
     };
     wait::until("blocks are on their way", || {
-        let has_some = flight
-            .farm
-            .place
-            .files("there")
-            .iter()
-            .any(|file| file.ends_with(".blocks"));
+        let place = &flight.farm.place;
+        let has_some = place.path("there").is_dir()
+            && place
+                .files("there")
+                .iter()
+                .any(|file| file.ends_with(".blocks"));
         (has_some && transfers()).then_some(())
     });
 }

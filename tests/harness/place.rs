@@ -1,6 +1,7 @@
 //! A temporary folder, and commands of `flyby` run in it.
 
 use std::ffi::OsStr;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -56,7 +57,12 @@ impl Place {
         let mut files = Vec::new();
         let mut folders = vec![root.clone()];
         while let Some(folder) = folders.pop() {
-            for entry in std::fs::read_dir(&folder).unwrap() {
+            let entries = match std::fs::read_dir(&folder) {
+                // Whoever uses it may remove what is in it meanwhile.
+                Err(error) if error.kind() == ErrorKind::NotFound && folder != root => continue,
+                entries => entries.unwrap(),
+            };
+            for entry in entries {
                 let path = entry.unwrap().path();
                 if path.is_dir() {
                     folders.push(path);

@@ -4,7 +4,10 @@
 //! the work, and can be shared by threads; the bytes are the same.
 
 use std::collections::HashMap;
-use std::io::BufWriter;
+use std::fs::File;
+use std::io::{
+    self, BufRead as _, BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write as _,
+};
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
 use exr::block::writer::ChunksWriter;
@@ -44,6 +47,9 @@ const TILE: usize = GRID_SQUARE as usize;
 /// Tiles that are compressed between two writes, for each thread: what an image's encoding holds in memory
 /// is bounded by them.
 const TILES_A_THREAD: usize = 64;
+
+/// Where the attributes begin: behind the magic number and the version.
+const HEADER_FROM: u64 = 8;
 
 /// Largest finite half; light beyond it is stored as this, never as infinity.
 const HALF_MAX: f32 = 65_504.0;
@@ -91,7 +97,35 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
         },
     )
     .map_err(|error| ours.take().unwrap_or_else(|| refused(pending, error)))?;
+    let io = |source| ImageError::io("write", pending.target(), source);
+    out.flush().map_err(io)?;
+    sort_attributes(pending.file()).map_err(io)?;
     Ok(hasher.finish())
+}
+
+/// Puts the attributes of a file's header in the order of their names: the `exr` crate leaves some in that of a hash map,
+/// which is never the same twice.
+fn sort_attributes(mut file: &File) -> io::Result<()> {
+    let mut reader = BufReader::new(file);
+    reader.seek(SeekFrom::Start(HEADER_FROM))?;
+    let mut attributes = Vec::new();
+    loop {
+        // Name and kind end with a zero each, the length of the value follows; a name without letters ends the header.
+        let mut attribute = Vec::new();
+        if reader.read_until(0, &mut attribute)? <= 1 {
+            break;
+        }
+        reader.read_until(0, &mut attribute)?;
+        let mut length = [0; 4];
+        reader.read_exact(&mut length)?;
+        attribute.extend(length);
+        let length = u64::from(u32::from_le_bytes(length));
+        reader.by_ref().take(length).read_to_end(&mut attribute)?;
+        attributes.push(attribute);
+    }
+    attributes.sort();
+    file.seek(SeekFrom::Start(HEADER_FROM))?;
+    file.write_all(&attributes.concat())
 }
 
 /// A tile before it is compressed: its place among the tiles, its number in the file, and its samples.

@@ -19,8 +19,12 @@ impl Pending {
     /// Begins `folder/name` as `folder/.name.partial`.
     pub(crate) fn create(folder: &Path, name: &str) -> Result<Self, ImageError> {
         let partial = folder.join(format!(".{name}.partial"));
-        let file =
-            File::create(&partial).map_err(|source| ImageError::io("create", &partial, source))?;
+        // Some formats are finished by a look at what was written.
+        let mut options = File::options();
+        let options = options.read(true).write(true).create(true).truncate(true);
+        let file = options
+            .open(&partial)
+            .map_err(|source| ImageError::io("create", &partial, source))?;
         Ok(Self {
             file,
             partial,
