@@ -23,6 +23,8 @@ mod gridengine;
 mod orphans;
 mod pilot;
 mod poll;
+mod readme;
 mod rough;
+mod slots;
 mod timelimit;
 mod two_sites;

@@ -8,6 +8,7 @@
 mod before;
 mod held;
 mod settings;
+mod stock;
 mod submit;
 #[cfg(test)]
 mod tests;
@@ -20,6 +21,7 @@ use crate::orders::{Order, Seen, SeenArray, Stands, Wants, edges};
 
 use held::{Array, History, Tile};
 pub use settings::{ARRAY_TASKS, Settings};
+use stock::{Flow, Stock};
 
 /// Tries in a row that brought no block, after which a tile fails.
 const TRIES_MAX: u32 = 3;
@@ -27,9 +29,6 @@ const TRIES_MAX: u32 = 3;
 /// A task whose host is gone counts as ended after so many looks in a row: a queue's daemon that was started again hears of
 /// all its hosts within a minute.
 const AWAY_LOOKS: u32 = 3;
-
-/// Images beyond those that the site's `ahead` asks for, at most.
-const RAISED_MAX: u32 = 63;
 
 /// What became of a tile is forgotten so many observations after it was last leased.
 const REMEMBERED: u64 = 1_000;
@@ -58,8 +57,6 @@ pub enum Action {
         /// Its task.
         task: u32,
     },
-    /// Submit an array; where that fails say so: [`Poll::refused`].
-    Submit(Order),
 }
 
 /// Whether a block came for the first time.
@@ -93,9 +90,7 @@ pub struct Poll {
     tiles: BTreeMap<AttemptId, Tile>,
     arrays: BTreeMap<String, Array>,
     histories: BTreeMap<(ImageRef, Rect), History>,
-    raised: u32,
-    /// Images of which the last block arrived since the last observation.
-    finished: u32,
+    stock: Stock,
     failures: u32,
     quiet_until: Timestamp,
     standing: Standing,
@@ -105,14 +100,13 @@ impl Poll {
     /// A site that holds nothing.
     pub fn new(settings: Settings) -> Self {
         Self {
+            stock: Stock::new(settings.ahead),
             settings,
             number: 0,
             observations: 0,
             tiles: BTreeMap::new(),
             arrays: BTreeMap::new(),
             histories: BTreeMap::new(),
-            raised: 0,
-            finished: 0,
             failures: 0,
             quiet_until: Timestamp(0),
             standing: Standing::default(),
@@ -131,16 +125,19 @@ impl Poll {
 
     /// Images that the site should hold.
     pub fn credit(&self) -> u32 {
-        1 + self
-            .settings
-            .ahead
-            .saturating_add(self.raised)
-            .min(RAISED_MAX)
+        self.stock.credit()
     }
 
     /// Whether there is anything at the site, or should be.
     pub fn is_empty(&self) -> bool {
         self.tiles.is_empty() && self.arrays.is_empty()
+    }
+
+    /// Grid squares, of 1,024 pixels each, that are leased to the site and not durable.
+    pub fn squares(&self) -> u64 {
+        let missing = self.tiles.values().flat_map(|tile| &tile.missing);
+        let pixels: u64 = missing.map(|block| block.area()).sum();
+        pixels.div_ceil(1_024)
     }
 
     /// The scenes of what is leased.
@@ -228,19 +225,16 @@ impl Poll {
         tile.arrived += 1;
         tile.took = tile.took + took;
         if tile.missing.is_empty() {
-            let image = tile.lease.image;
-            let key = (image, tile.lease.tile);
+            let key = (tile.lease.image, tile.lease.tile);
             self.histories.remove(&key);
             self.forget(attempt);
-            if !self.tiles.values().any(|tile| tile.lease.image == image) {
-                self.finished += 1;
-            }
         }
         Came::First
     }
 
-    /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do.
-    pub fn observe(&mut self, now: Timestamp, seen: &Seen) -> Vec<Action> {
+    /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do. What is leased
+    /// after that, since the [credit](Self::credit) is another now, still comes in time for [`Self::orders`].
+    pub fn observe(&mut self, seen: &Seen) -> Vec<Action> {
         self.observations += 1;
         let mut actions = Vec::new();
         let by_name: BTreeMap<_, _> = seen
@@ -250,18 +244,20 @@ impl Poll {
             .collect();
         self.follow(&by_name, &mut actions);
         self.tidy(&by_name, &mut actions);
-        // The stock did not last from one look to the next (thesis §C.3.5).
-        if self.finished >= self.credit() && self.raised < RAISED_MAX {
-            self.raised += 1;
-        }
-        self.finished = 0;
+        let flow = self.flow(&by_name);
+        self.stock.saw(flow);
         let (now_is, kept) = (self.observations, REMEMBERED);
         self.histories
             .retain(|_, history| history.observation + kept > now_is);
-        if now >= self.quiet_until {
-            self.submit(&mut actions);
-        }
         actions
+    }
+
+    /// Arrays to submit, in this order; where one fails say so: [`Self::refused`].
+    pub fn orders(&mut self, now: Timestamp) -> Vec<Order> {
+        match now >= self.quiet_until {
+            true => self.put_into_arrays(),
+            false => Vec::new(),
+        }
     }
 
     /// An array could not be submitted, or may have been: the next look says.
@@ -355,13 +351,9 @@ impl Poll {
             away += count(there, Stands::Away);
             waiting += count(there, Stands::Waits);
             running += count(there, Stands::Runs);
-            let array = self.arrays.entry(name.to_owned()).or_insert_with(|| Array {
-                // What nobody knows, nobody wants.
-                tiles: vec![None; there.tasks.len()],
-                is_sure: true,
-                time_limit: None,
-                deleted: BTreeSet::new(),
-            });
+            // What nobody knows, nobody wants.
+            let unknown = || Array::new(vec![None; there.tasks.len()]);
+            let array = self.arrays.entry(name.to_owned()).or_insert_with(unknown);
             array.is_sure |= there.is_submitted;
             let is_wanted = array.tiles.iter().any(Option::is_some);
             let live = (1..)
@@ -400,6 +392,33 @@ impl Poll {
         if !remove.is_empty() {
             actions.push(Action::Remove(remove));
         }
+    }
+
+    /// How fast tasks begin, and how many images have begun.
+    fn flow(&mut self, seen: &BTreeMap<&str, &SeenArray>) -> Flow {
+        let mut flow = Flow::default();
+        for (name, array) in &mut self.arrays {
+            let there = seen.get(name.as_str());
+            let waiting = there.map_or(0, |there| count(there, Stands::Waits));
+            let before = std::mem::replace(&mut array.waiting, waiting);
+            if array.tiles.iter().any(Option::is_some) {
+                flow.tasks_begun += before.saturating_sub(waiting);
+            }
+        }
+        let mut images = BTreeMap::<ImageRef, (u32, bool)>::new();
+        for tile in self.tiles.values() {
+            let (tasks, has_begun) = images.entry(tile.lease.image).or_default();
+            *tasks += 1;
+            let array = tile
+                .place
+                .as_ref()
+                .and_then(|(name, _)| self.arrays.get(name));
+            *has_begun |= array.is_some_and(Array::has_begun);
+        }
+        flow.image_tasks = images.values().map(|image| image.0).max().unwrap_or(0);
+        let begun = images.values().filter(|image| image.1);
+        flow.begun = u32::try_from(begun.count()).unwrap_or(u32::MAX);
+        flow
     }
 
     /// A tile is the site's no more.

@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 
 use model::{AttemptId, Begun, Rect};
 
-use super::Poll;
 use super::held::{Array, Tile};
+use super::{Poll, count};
 use crate::orders::{Seen, Stands};
 
 impl Poll {
@@ -58,12 +58,9 @@ impl Poll {
                 self.tiles
                     .insert(claim.attempt, Tile::new(lease, Some(place)));
             }
-            let found = Array {
-                tiles,
-                is_sure: true,
-                time_limit: order.time_limit,
-                deleted: BTreeSet::new(),
-            };
+            let mut found = Array::new(tiles);
+            found.time_limit = order.time_limit;
+            found.waiting = count(array, Stands::Waits);
             self.arrays.insert(array.name.clone(), found);
         }
         begun

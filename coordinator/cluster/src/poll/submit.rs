@@ -1,11 +1,11 @@
 //! New arrays: what is leased and in none goes into as few as it takes, and may run for as long as its dearest tile asks for.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use model::{AttemptId, Digest, ImageRef, Span};
 
+use super::Poll;
 use super::held::{Array, Tile};
-use super::{Action, Poll};
 use crate::orders::{Order, TaskOrder};
 
 /// A task asks for so many times what it is expected to take…
@@ -19,7 +19,8 @@ pub(super) const LIMIT_LEAST: Span = Span::from_secs(120);
 
 impl Poll {
     /// Puts what is leased and in no array into new ones, an image into as few as it takes.
-    pub(super) fn submit(&mut self, actions: &mut Vec<Action>) {
+    pub(super) fn put_into_arrays(&mut self) -> Vec<Order> {
+        let mut orders = Vec::new();
         let mut images = BTreeMap::<(ImageRef, Digest), Vec<AttemptId>>::new();
         for (&attempt, tile) in self.tiles.iter().filter(|(_, tile)| tile.place.is_none()) {
             let key = (tile.lease.image, tile.lease.scene);
@@ -39,14 +40,10 @@ impl Poll {
                         tasks.push(TaskOrder::from(&tile.lease));
                     }
                 }
-                let array = Array {
-                    tiles: attempts.iter().copied().map(Some).collect(),
-                    is_sure: true,
-                    time_limit,
-                    deleted: BTreeSet::new(),
-                };
+                let mut array = Array::new(attempts.iter().copied().map(Some).collect());
+                array.time_limit = time_limit;
                 self.arrays.insert(name.clone(), array);
-                actions.push(Action::Submit(Order {
+                orders.push(Order {
                     name,
                     scene: scene.to_string(),
                     job: image.job.0,
@@ -56,9 +53,10 @@ impl Poll {
                     running_max: self.settings.running_max,
                     time_limit,
                     tasks,
-                }));
+                });
             }
         }
+        orders
     }
 
     /// How long a task of these tiles may run: by the site's word, else by what is known of the dearest.

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use cluster::busy::Look;
 use cluster::camp::Camp;
 use cluster::pilot::{self, Action, Pilot, Settings, Standing, Wanted};
 use cluster::survey::Program;
@@ -195,9 +196,15 @@ impl Errand {
             known.pilot.has_said(&said);
             tracing::warn!(site, array, task, said, "an allocation failed");
         }
-        self.show(known.pilot.standing());
-        let asked = unix_ms();
-        self.board.change(site, |site| site.asked_unix_ms = asked);
+        let standing = known.pilot.standing();
+        self.show(standing);
+        let look = Look {
+            at_unix_ms: unix_ms(),
+            running: standing.running,
+            waiting: standing.waiting,
+            ..Look::default()
+        };
+        self.board.saw(site, look);
         Ok(())
     }
 
