@@ -7,7 +7,7 @@ use serde_json::Value;
 
 use crate::engine::{Engine, Kind};
 use crate::flight::Flight;
-use crate::harness::scenes::{FLYBY, lasting};
+use crate::harness::scenes::{FLYBY, busy};
 use crate::harness::{frames, wait};
 
 /// How long one thread would take; no allocation may run for longer than a minute, the shortest limit of Slurm.
@@ -19,7 +19,7 @@ fn a_job_is_done_through_allocations_of_a_minute() {
     let Some(engine) = Engine::slurm(1) else {
         return;
     };
-    let work = lasting(WORK);
+    let work = busy(WORK);
     let more = "max_running = 1\nahead = 0\ntime_limit = '1 min'\nidle = '5 s'";
     let flight = Flight::new(&engine, Kind::Slurm, more);
     // Each image is one tile, for which no allocation has time enough.
