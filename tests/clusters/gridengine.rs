@@ -8,8 +8,11 @@ use crate::flight::Flight;
 use crate::harness::scenes::{FLYBY, lasting, small};
 use crate::harness::{frames, wait};
 
-/// Most tasks of an array that the queue takes: fewer than [`SMALL_TILES`].
+/// Most tasks of an array that the queue takes: fewer than an image has tiles by [`SMALL_TILES`].
 const TASKS_MAX: usize = 6;
+
+/// The squarest cut of an image of 200×150 pixels into so few: 100×75.
+const SQUAREST: usize = 4;
 
 /// In poll mode an image of [`small`] is twelve tiles by this alone.
 const SMALL_TILES: &str = "mode = 'poll'\nmin_tile_pixels = 2500\nmax_array_size = 1000";
@@ -56,7 +59,7 @@ fn an_image_is_cut_as_the_queue_s_arrays_allow_also_where_that_changes() {
     wait::until("the queue has its books", || {
         let arrays = arrays(&engine);
         let sizes: Vec<_> = arrays.into_values().collect();
-        (sizes == [TASKS_MAX, TASKS_MAX]).then_some(())
+        (sizes == [SQUAREST, SQUAREST]).then_some(())
     });
 
     // The coordinator does not know of this.

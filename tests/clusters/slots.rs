@@ -119,14 +119,14 @@ fn stay_busy_from_image_to_image_with_one_image_ahead() {
         assert_eq!(site["slots"], 4, "{site}");
         site["free_share"].as_f64().unwrap()
     });
-    println!(
-        "a slot was free while nothing waited, by the queue: {shares:?}, by the looks: {told:?}"
-    );
     for [none, one] in [shares, told] {
-        assert!(one < 0.02, "{one} with one image ahead");
+        assert!(
+            one < 0.02,
+            "with one image ahead: by the queue {shares:?}, by the looks {told:?}"
+        );
         assert!(
             none > one + 0.02,
-            "{none} without, {one} with one image ahead"
+            "without and with one: by the queue {shares:?}, by the looks {told:?}"
         );
     }
     let plot = fs::read_to_string(farm.place.path("busy.svg")).unwrap();

@@ -53,7 +53,6 @@ enum Found {
 /// A site in pilot mode that was looked at.
 struct Known {
     pilot: Pilot,
-    limits: Limits,
     /// Whether the queue was seen to hold nothing of ours.
     is_empty: bool,
     /// Whether the program was seen to be the right one.
@@ -162,7 +161,6 @@ impl Errand {
         }
         Ok(Found::Pilot(Box::new(Known {
             pilot: Pilot::new(self.settings(&limits)),
-            limits,
             is_empty: false,
             is_ready: false,
         })))
@@ -210,7 +208,7 @@ impl Errand {
 
     fn submit(&self, now: Timestamp, known: &mut Known, name: &str, tasks: u32) {
         let submitted = self.make_ready(known).and_then(|()| {
-            let array = self.array(&known.limits, name, tasks);
+            let array = self.array(known.pilot.time_limit(), name, tasks);
             self.camp.queue.submit(&array)
         });
         let site = &self.camp.site.name;
@@ -227,7 +225,6 @@ impl Errand {
                 // Its limits may be others than they were.
                 if let Ok(limits) = self.camp.queue.limits() {
                     known.pilot.settle(self.settings(&limits));
-                    known.limits = limits;
                 }
             }
         }
@@ -238,13 +235,7 @@ impl Errand {
         Settings::of(&self.camp.site, limits, names)
     }
 
-    fn array(&self, limits: &Limits, name: &str, tasks: u32) -> Array {
-        // One that asks for no time is given the queue's.
-        let time_limit = match (self.camp.site.time_limit, limits.time) {
-            (Some(ours), Some(most)) => Some(ours.min(most)),
-            (Some(ours), None) => Some(ours),
-            (None, _) => limits.time_usual,
-        };
+    fn array(&self, time_limit: Option<Span>, name: &str, tasks: u32) -> Array {
         Array {
             script: pilot::script(&self.camp, self.pass.dials(&self.coordinator), time_limit),
             log: self.camp.log(name),
