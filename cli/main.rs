@@ -18,6 +18,7 @@ mod noise;
 mod options;
 mod output;
 mod places;
+mod plot;
 mod progress;
 mod render;
 mod site;

@@ -1,6 +1,5 @@
 //! Options that several commands share.
 
-use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use clap::Args;
@@ -146,9 +145,10 @@ impl Default for PlaceOptions {
 /// Which coordinator to talk to.
 #[derive(Args, Clone, Debug)]
 pub(crate) struct FarmOptions {
-    /// Address and port of the coordinator; else those that the token's file names, or the one that runs over the state folder.
-    #[arg(long, value_name = "ADDR", help_heading = "Farm")]
-    pub(crate) coordinator: Option<SocketAddr>,
+    /// Where the coordinator is, such as farm.example.org or 192.0.2.7:7359; else where the token's file says, or the one that
+    /// runs over the state folder.
+    #[arg(long, value_name = "ADDR", value_parser = values::host, help_heading = "Farm")]
+    pub(crate) coordinator: Option<String>,
 }
 
 #[cfg(test)]

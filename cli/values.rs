@@ -1,9 +1,37 @@
 //! How users write sizes, rectangles and numbers on the command line.
 
+use std::net::{IpAddr, SocketAddr};
+
 use model::rect::SIDE_MAX;
 use model::{Rect, Resolution, Span};
 
+use wire::place::DEFAULT_PORT;
+
 pub(crate) use model::words::{label, memory, span};
+
+/// A host or an address, and its port, which is the usual one where none is said: `farm.example.org`, `192.0.2.7:7359`, `[::1]:7359`.
+pub(crate) fn host(text: &str) -> Result<String, String> {
+    if text.parse::<SocketAddr>().is_ok() {
+        return Ok(text.to_owned());
+    }
+    if let Ok(address) = text.parse::<IpAddr>() {
+        return Ok(SocketAddr::new(address, DEFAULT_PORT).to_string());
+    }
+    let is_host = |host: &str| {
+        let is_letter = |letter: char| letter.is_alphanumeric() || "-._".contains(letter);
+        !host.is_empty() && !host.starts_with('-') && host.chars().all(is_letter)
+    };
+    let (host, port) = match text.rsplit_once(':') {
+        Some((host, port)) => (host, port.parse().ok()),
+        None => (text, Some(DEFAULT_PORT)),
+    };
+    match port.filter(|_| is_host(host)) {
+        Some(port) => Ok(format!("{host}:{port}")),
+        None => Err(format!(
+            "`{text}` is no address: write it as farm.example.org, farm.example.org:7359 or 192.0.2.7:7359"
+        )),
+    }
+}
 
 /// Two whole numbers from 1 to the longest side of an image, as in `400x300`.
 pub(crate) fn resolution(text: &str) -> Result<Resolution, String> {
@@ -131,6 +159,33 @@ mod tests {
 
     fn rect(x0: u32, y0: u32, x1: u32, y1: u32) -> Rect {
         Rect { x0, y0, x1, y1 }
+    }
+
+    #[test]
+    fn a_host_has_the_usual_port_unless_another_is_said() {
+        let port = DEFAULT_PORT;
+        for (text, expected) in [
+            ("farm.example.org", format!("farm.example.org:{port}")),
+            ("farm:80", "farm:80".to_owned()),
+            ("192.0.2.7", format!("192.0.2.7:{port}")),
+            ("192.0.2.7:80", "192.0.2.7:80".to_owned()),
+            ("::1", format!("[::1]:{port}")),
+            ("[::1]:80", "[::1]:80".to_owned()),
+        ] {
+            assert_eq!(host(text), Ok(expected));
+        }
+        for text in [
+            "",
+            ":80",
+            "farm:",
+            "farm:99999",
+            "a farm",
+            "-o",
+            "http://farm",
+            "a:b:1",
+        ] {
+            assert!(host(text).is_err(), "{text}");
+        }
     }
 
     #[test]

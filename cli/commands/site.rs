@@ -1,5 +1,6 @@
 //! `flyby site`: the clusters and hosts that `sites.toml` names.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
@@ -7,7 +8,7 @@ use cluster::camp::{Camp, farm_of};
 use cluster::survey::Nodes;
 use cluster::{ClusterError, Site, Sites, SitesError, install, survey};
 use miette::Severity;
-use wire::proto::{ListSitesRequest, SiteStatus};
+use wire::proto::{ListSitesRequest, LookBackRequest, SiteStatus};
 
 use crate::caret::Caret;
 use crate::error::{Ending, Error};
@@ -15,6 +16,7 @@ use crate::farm::link::{block_on, refused};
 use crate::options::{Context, FarmOptions};
 use crate::output;
 use crate::site::check::{Check, Checks, Verdict};
+use crate::site::plot::{Busy, Plotted};
 use crate::site::view::{Cleaned, Installed, Listed, SiteView};
 
 /// The file of sites inside the state folder.
@@ -28,6 +30,9 @@ pub(crate) enum SiteCommand {
     Check(CheckOptions),
     /// Copies a program to a site, without root, and runs it there before it takes the place of the one before.
     Install(Install),
+    /// Says how busy polled sites were since the coordinator was started, and for how long a slot was free while nothing of the
+    /// farm's waited in the queue; draws it where a file is named.
+    Plot(PlotOptions),
     /// Ends and removes everything that this farm has at a site, the program aside. A coordinator that runs submits again
     /// what its jobs need: stop it first, or cancel them.
     Clean(Clean),
@@ -83,6 +88,19 @@ pub(crate) struct Install {
 }
 
 #[derive(Args, Debug)]
+pub(crate) struct PlotOptions {
+    /// The sites; else all of them.
+    names: Vec<String>,
+
+    /// Where to draw it, as SVG: busy slots in blue, waiting tasks as a grey line, red where a slot was free for nothing.
+    #[arg(short, long, value_name = "FILE", help_heading = "Results")]
+    out: Option<PathBuf>,
+
+    #[command(flatten)]
+    farm: FarmOptions,
+}
+
+#[derive(Args, Debug)]
 pub(crate) struct Clean {
     /// The site.
     name: String,
@@ -97,6 +115,7 @@ pub(crate) fn run(context: &Context, command: SiteCommand) -> Result<Ending, Err
         SiteCommand::List(options) => list(context, &options),
         SiteCommand::Check(options) => check(context, &options),
         SiteCommand::Install(options) => install_at(context, &options),
+        SiteCommand::Plot(options) => plot(context, options),
         SiteCommand::Clean(options) => clean(context, &options),
     }
 }
@@ -245,6 +264,41 @@ fn install_at(context: &Context, options: &Install) -> Result<Ending, Error> {
     let installed = Installed::new(&camp.site, found);
     output::print(context.output, &installed)?;
     Ok(Ending::Done)
+}
+
+fn plot(context: &Context, options: PlotOptions) -> Result<Ending, Error> {
+    let plotted = Plotted {
+        sites: block_on(busy(context, &options))?,
+        plot: options.out,
+    };
+    if let Some(path) = &plotted.plot {
+        let cannot = || Error::failed(format!("cannot write the plot `{}`", path.display()));
+        let svg = plotted.draw().map_err(|error| cannot().because(error))?;
+        fs::write(path, svg).map_err(|error| cannot().because(error))?;
+    }
+    output::print(context.output, &plotted)?;
+    Ok(Ending::Done)
+}
+
+/// How busy sites were, as the coordinator saw it.
+async fn busy(context: &Context, options: &PlotOptions) -> Result<Vec<Busy>, Error> {
+    let mut farm = context.connect(&options.farm).await?;
+    let refused = |status| refused("cannot look back at the sites", status);
+    let names = match options.names.is_empty() {
+        false => options.names.clone(),
+        true => {
+            let sites = farm.list_sites(ListSitesRequest {}).await;
+            let sites = sites.map_err(refused)?.into_inner().sites;
+            sites.into_iter().map(|site| site.name).collect()
+        }
+    };
+    let mut all = Vec::new();
+    for site in names {
+        let request = LookBackRequest { site: site.clone() };
+        let looks = farm.look_back(request).await.map_err(refused)?;
+        all.push(Busy::new(site, looks.into_inner()));
+    }
+    Ok(all)
 }
 
 fn clean(context: &Context, options: &Clean) -> Result<Ending, Error> {

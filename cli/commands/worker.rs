@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use agent::{Ask, Entry, ExitReason, Invitation, RenderPainter, RunError};
+use agent::{Admission, Ask, ExitReason, Invitation, RenderPainter, RunError};
 use clap::{Args, Subcommand};
 use model::Span;
 use render::SimdLevel;
@@ -176,8 +176,8 @@ async fn list(context: &Context, options: &FarmOptions) -> Result<Ending, Error>
 }
 
 fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
-    let entry = entry(context, options)?;
-    let coordinator = entry.to_string();
+    let admission = admission(context, options)?;
+    let coordinator = admission.to_string();
     let home = match &options.name {
         Some(name) => Some(Home::take(&context.state()?, name)?),
         None => None,
@@ -193,7 +193,7 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
         labels: options.label.clone(),
         idle: options.idle,
         time_limit: options.time_limit,
-        ..agent::Config::new(entry, name, threads.unwrap_or(NonZeroU32::MIN))
+        ..agent::Config::new(admission, name, threads.unwrap_or(NonZeroU32::MIN))
     };
     let painter = RenderPainter::new(options.simd.unwrap_or_else(SimdLevel::best));
     options.daemon.log()?;
@@ -225,11 +225,10 @@ fn work(context: &Context, options: &Worker) -> Result<Ending, Error> {
 }
 
 /// How it gets to the coordinator: by a token's file, or on this machine by the state folder.
-fn entry(context: &Context, options: &Worker) -> Result<Entry, Error> {
+fn admission(context: &Context, options: &Worker) -> Result<Admission, Error> {
     let Some(file) = context.token_file()? else {
-        let address = context.address(&options.farm)?;
-        return Ok(Entry::Local {
-            coordinator: context.on_this_machine(address)?,
+        return Ok(Admission::Local {
+            coordinator: context.here(&options.farm)?,
             token: context.token()?,
         });
     };
@@ -241,9 +240,9 @@ fn entry(context: &Context, options: &Worker) -> Result<Entry, Error> {
         .next("make one with `flyby token create --role worker`"));
     }
     let keep = context.state.as_deref();
-    Ok(Entry::Invited(Invitation {
+    Ok(Admission::Invited(Invitation {
         file,
-        address: options.farm.coordinator.map(|address| address.to_string()),
+        address: options.farm.coordinator.clone(),
         keep: keep.map(|state| state.join(place::JOINED_FOLDER)),
     }))
 }

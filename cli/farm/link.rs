@@ -1,7 +1,7 @@
 //! The way to a coordinator, and what its refusals mean for the exit code.
 
 use std::future::Future;
-use std::net::SocketAddr;
+use std::net::{SocketAddr, ToSocketAddrs as _};
 use std::path::PathBuf;
 
 use wire::Failure;
@@ -51,33 +51,30 @@ impl Context {
     /// How the coordinator is reached: as the token's file says, or on this machine by its state folder.
     pub(crate) fn way(&self, options: &FarmOptions) -> Result<Way, Error> {
         if let Some(file) = self.token_file()? {
-            let address = options.coordinator.map(|address| address.to_string());
-            return Way::by_token(&file, address)
+            return Way::by_token(&file, options.coordinator.clone())
                 .map_err(|failure| Error::failed("cannot set up TLS").because(failure));
         }
-        let address = self.address(options)?;
-        Ok(Way::local(self.on_this_machine(address)?, self.token()?))
+        Ok(Way::local(self.here(options)?, self.token()?))
     }
 
-    /// An address that is reached in the clear, which only one of this machine may be.
-    pub(crate) fn on_this_machine(&self, address: SocketAddr) -> Result<SocketAddr, Error> {
-        match address.ip().to_canonical().is_loopback() {
-            true => Ok(address),
-            false => Err(Error::usage(format!(
-                "the coordinator at {address} is reached by TLS, and for that a token is needed"
+    /// An address of this machine, which alone is reached in the clear: as told, or where the coordinator says in its state
+    /// folder that it listens.
+    pub(crate) fn here(&self, options: &FarmOptions) -> Result<SocketAddr, Error> {
+        let Some(named) = &options.coordinator else {
+            let coordinator = place::coordinator(&self.state()?).map_err(not_found)?;
+            return Ok(coordinator.address);
+        };
+        let resolved = named.to_socket_addrs().map_err(|error| {
+            Error::unreachable(format!("the coordinator's address {named} is not known"))
+                .because(error)
+        })?;
+        let mut addresses = resolved.filter(|address| address.ip().to_canonical().is_loopback());
+        addresses.next().ok_or_else(|| {
+            Error::usage(format!(
+                "the coordinator at {named} is reached by TLS, and for that a token is needed"
             ))
-            .next("make one where it runs (`flyby token create --out FILE`), bring the file here, and name it with `--token-file FILE`; on its own machine leave `--coordinator` away")),
-        }
-    }
-
-    /// Where the coordinator listens: as told, or as it says in its state folder.
-    pub(crate) fn address(&self, options: &FarmOptions) -> Result<SocketAddr, Error> {
-        match options.coordinator {
-            Some(address) => Ok(address),
-            None => place::coordinator(&self.state()?)
-                .map(|coordinator| coordinator.address)
-                .map_err(not_found),
-        }
+            .next("make one where it runs (`flyby token create --out FILE`), bring the file here, and name it with `--token-file FILE`; on its own machine leave `--coordinator` away")
+        })
     }
 
     /// The coordinator's token, from the state folder.
@@ -144,10 +141,33 @@ mod tests {
             token_file: None,
         };
         let error = context
-            .address(&FarmOptions { coordinator: None })
+            .here(&FarmOptions { coordinator: None })
             .unwrap_err();
         assert_eq!(error.ending(), Ending::Unreachable);
         assert!(error.to_string().contains("flyby coordinator"), "{error}");
+    }
+
+    #[test]
+    fn in_the_clear_only_this_machine_is_reached_by_whatever_name() {
+        let context = Context {
+            output: crate::output::Format::Table,
+            state: None,
+            token_file: None,
+        };
+        let here = |name: &str| {
+            context.here(&FarmOptions {
+                coordinator: Some(name.to_owned()),
+            })
+        };
+        assert_eq!(here("127.0.0.1:7").unwrap().port(), 7);
+        assert!(here("localhost:7").unwrap().ip().is_loopback());
+        assert_eq!(here("192.0.2.7:7").unwrap_err().ending(), Ending::Usage);
+        let unknown = here("nobody.invalid:7").unwrap_err();
+        assert_eq!(unknown.ending(), Ending::Unreachable);
+        assert!(
+            unknown.to_string().contains("nobody.invalid:7"),
+            "{unknown}"
+        );
     }
 
     #[test]

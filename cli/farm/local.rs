@@ -102,7 +102,7 @@ impl LocalFarm {
             ..context.clone()
         };
         let options = FarmOptions {
-            coordinator: Some(self.address),
+            coordinator: Some(self.address.to_string()),
         };
         (context, options)
     }

@@ -1,28 +1,21 @@
 //! Plots as SVG. Every axis says its unit: wavenumbers in cycles per lattice cell, power in decibels
 //! relative to a white noise of unit density (the thesis's axes have no such unit, ERRATA rows 1442, 1513).
 
-use std::error::Error as StdError;
 use std::ops::Range;
 
-use plotters::coord::Shift;
 use plotters::coord::ranged1d::ValueFormatter;
 use plotters::prelude::*;
 
 use super::measure::{Covariance, Plane};
 use super::rings::decibels;
 use super::source::whole;
-
-type Drawn = Result<String, Box<dyn StdError + Send + Sync>>;
-type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
+use crate::plot::{Cannot, Drawn, LABELS, TITLE, draw};
 
 /// Pixels of a plot of curves.
 const CURVES: (u32, u32) = (900, 560);
 
 /// Pixels of a map.
 const MAP: (u32, u32) = (760, 680);
-
-/// How axes and curves are lettered, and how large.
-const LABELS: (&str, u32) = ("sans-serif", 13);
 
 /// Cells of a map along a side, at most.
 const MAP_SIDE: usize = 128;
@@ -70,7 +63,7 @@ pub(crate) fn curves(words: Words, axis: Axis, curves: &[Curve]) -> Drawn {
     draw(CURVES, |area| {
         let mut builder = ChartBuilder::on(area);
         builder
-            .caption(words.title, ("sans-serif", 22))
+            .caption(words.title, TITLE)
             .margin(14)
             .x_label_area_size(48)
             .y_label_area_size(72);
@@ -98,7 +91,7 @@ fn lines<'a, 'b: 'a, X, Y>(
     chart: &mut ChartContext<'a, SVGBackend<'b>, Cartesian2d<X, Y>>,
     words: Words,
     curves: &[Curve],
-) -> Result<(), Box<dyn StdError + Send + Sync>>
+) -> Result<(), Cannot>
 where
     X: Ranged<ValueType = f64> + ValueFormatter<f64>,
     Y: Ranged<ValueType = f64> + ValueFormatter<f64>,
@@ -200,7 +193,7 @@ impl Map {
         draw(MAP, |area| {
             let (map, bar) = area.split_horizontally(MAP.0 - 110);
             let mut chart = ChartBuilder::on(&map)
-                .caption(&self.title, ("sans-serif", 22))
+                .caption(&self.title, TITLE)
                 .margin(14)
                 .x_label_area_size(48)
                 .y_label_area_size(64)
@@ -280,18 +273,4 @@ fn span(numbers: impl Iterator<Item = f64>, room: f64) -> Range<f64> {
     } else {
         0.0..1.0
     }
-}
-
-fn draw(
-    size: (u32, u32),
-    onto: impl FnOnce(&Area<'_>) -> Result<(), Box<dyn StdError + Send + Sync>>,
-) -> Drawn {
-    let mut svg = String::new();
-    {
-        let area = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        area.fill(&WHITE)?;
-        onto(&area)?;
-        area.present()?;
-    }
-    Ok(svg)
 }

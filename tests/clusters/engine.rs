@@ -40,9 +40,14 @@ impl Engine {
 
     /// Slurm with nodes `n1`, `n2`, … of two processors each; `None` where it cannot run here.
     pub(crate) fn slurm(nodes: u32) -> Option<Self> {
+        Self::slurm_with(nodes, &[])
+    }
+
+    /// The same, with these settings of its script.
+    pub(crate) fn slurm_with(nodes: u32, settings: &[(&str, &str)]) -> Option<Self> {
         let mut engine = Self::new();
         engine
-            .up("slurm", &[&nodes.to_string()], &[])
+            .up("slurm", &[&nodes.to_string()], settings)
             .then_some(engine)
     }
 
@@ -63,8 +68,14 @@ impl Engine {
     /// ssh besides, on every host that there is, or on loopback as `node1`.
     #[must_use]
     pub(crate) fn add_ssh(&mut self) -> bool {
+        self.add_ssh_with(&[])
+    }
+
+    /// The same, with these settings of its script.
+    #[must_use]
+    pub(crate) fn add_ssh_with(&mut self, settings: &[(&str, &str)]) -> bool {
         let has_hosts = self.folder.join("net").is_dir();
-        self.up("ssh", if has_hosts { &[] } else { &["1"] }, &[])
+        self.up("ssh", if has_hosts { &[] } else { &["1"] }, settings)
     }
 
     /// Starts one kind; false where it cannot run here.

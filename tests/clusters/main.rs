@@ -21,4 +21,6 @@ mod engine;
 mod flight;
 mod pilot;
 mod poll;
+mod readme;
+mod slots;
 mod two_sites;

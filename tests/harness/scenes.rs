@@ -63,6 +63,11 @@ pub(crate) fn slow() -> &'static Reference {
 
 /// The same, with as many rays as keep one thread busy for so long.
 pub(crate) fn lasting(time: Duration) -> Reference {
+    Reference::new(rays_for(time))
+}
+
+/// N of the N×N rays with which images 0 and 1 of [`FLYBY`], 200×150 pixels each, keep one thread busy for so long.
+pub(crate) fn rays_for(time: Duration) -> u32 {
     let start = Instant::now();
     let quick = [
         "--resolution",
@@ -79,7 +84,7 @@ pub(crate) fn lasting(time: Duration) -> Reference {
     while took * (rays * rays) < time {
         rays += 1;
     }
-    Reference::new(rays)
+    rays
 }
 
 /// Renders in one process; answers the frames' film digests, as their files tell them.

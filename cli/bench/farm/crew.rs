@@ -5,7 +5,7 @@ use std::num::NonZeroU32;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use agent::{Ask, Entry, ExitReason, RunError};
+use agent::{Admission, Ask, ExitReason, RunError};
 use tokio::runtime::Runtime;
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
@@ -39,11 +39,11 @@ impl<'a> Crew<'a> {
         null: Null,
     ) -> Self {
         let workers = (1..=count).map(|number| {
-            let entry = Entry::Local {
+            let admission = Admission::Local {
                 coordinator,
                 token: token.clone(),
             };
-            let config = agent::Config::new(entry, format!("null-{number}"), threads);
+            let config = agent::Config::new(admission, format!("null-{number}"), threads);
             let (asks, heard) = mpsc::channel(1);
             let painter = Arc::new(null.clone());
             (asks, runtime.spawn(agent::run(config, painter, heard)))

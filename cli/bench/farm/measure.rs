@@ -232,7 +232,7 @@ impl<'a> Bench<'a> {
             ..self.context.clone()
         };
         let farm = FarmOptions {
-            coordinator: Some(coordinator.address),
+            coordinator: Some(coordinator.address.to_string()),
         };
         let handed = submission.hand_in(&context, &farm);
         self.runtime.block_on(handed).map(drop)

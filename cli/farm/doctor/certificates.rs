@@ -5,7 +5,7 @@ use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 
 use wire::place;
-use wire::tls::certificate::{Age, Facts, moment, now, of_pem};
+use wire::tls::certificate::{Age, Claims, moment, now, of_pem};
 use wire::tls::token_file::TokenFile;
 
 use super::Finding;
@@ -43,30 +43,30 @@ pub(super) fn authority(state: &Path) -> Vec<Finding> {
         &[path, state.join(place::TOKENS_FILE)],
         "where somebody may have read the authority's key, move it away, start the coordinator again and make new tokens",
     );
-    let facts = of_pem(&text).and_then(|certificate| Facts::read(&certificate));
-    findings.push(match facts {
+    let claims = of_pem(&text).and_then(|certificate| Claims::read(&certificate));
+    findings.push(match claims {
         None => Finding::bad(
             "authority",
             "the certificate authority of the state folder cannot be read",
             "put a copy back; without one, move `authority.pem` away: the coordinator makes another, and every worker and user of other machines needs a new token",
         ),
-        Some(facts) if facts.age(now()) == Age::TooYoung => Finding::bad(
+        Some(claims) if claims.age(now()) == Age::TooYoung => Finding::bad(
             "authority",
             format!(
                 "the certificate authority counts from {} on, and this machine's clock says {}",
-                moment(facts.not_before),
+                moment(claims.not_before),
                 moment(now())
             ),
             "this clock was set back: let it follow a time server",
         ),
-        Some(facts) if facts.not_after < now() + AUTHORITY_LOW => Finding::doubtful(
+        Some(claims) if claims.not_after < now() + AUTHORITY_LOW => Finding::doubtful(
             "authority",
-            format!("the certificate authority counts until {}", moment(facts.not_after)),
+            format!("the certificate authority counts until {}", moment(claims.not_after)),
             "before that, move `authority.pem` away and start the coordinator again; then make new tokens",
         ),
-        Some(facts) => Finding::fine(
+        Some(claims) => Finding::fine(
             "authority",
-            format!("counts until {}; only its owner can read its key", moment(facts.not_after)),
+            format!("counts until {}; only its owner can read its key", moment(claims.not_after)),
         ),
     });
     findings
@@ -111,28 +111,30 @@ pub(super) fn joined(state: &Path) -> Vec<Finding> {
         &keys,
         "where somebody may have read it, revoke the token that the worker joined by",
     );
-    let facts: Vec<Facts> = places
+    let claims: Vec<Claims> = places
         .iter()
-        .filter_map(|place| Facts::read(&fs::read(place.join("certificate.der")).ok()?))
+        .filter_map(|place| Claims::read(&fs::read(place.join("certificate.der")).ok()?))
         .collect();
     let now = now();
-    let early = facts.iter().find(|facts| facts.age(now) == Age::TooYoung);
-    if let Some(facts) = early {
+    let early = claims
+        .iter()
+        .find(|claims| claims.age(now) == Age::TooYoung);
+    if let Some(claims) = early {
         findings.push(Finding::bad(
             "joined",
             format!(
                 "a worker's certificate counts from {} on, and this machine's clock says {}",
-                moment(facts.not_before),
+                moment(claims.not_before),
                 moment(now)
             ),
             "one of the two clocks is wrong: let both machines follow a time server",
         ));
     }
-    let expired = facts
+    let expired = claims
         .iter()
-        .filter(|facts| facts.age(now) == Age::Expired)
+        .filter(|claims| claims.age(now) == Age::Expired)
         .count();
-    let alive = facts.len() - expired;
+    let alive = claims.len() - expired;
     findings.push(Finding::fine(
         "joined",
         format!("{alive} certificates of workers count, {expired} have expired; workers that start again with an expired one need a token that still opens"),

@@ -12,10 +12,11 @@
 //! - [`survey`]: what a site is like, for `flyby site check`; [`install`]: the program brought there.
 //! - [`pilot`]: how many allocations a site should have, a function of what was seen.
 //! - [`orders`]: what the coordinator and `flyby site-agent` on a login node say to each other in poll mode;
-//!   [`poll`]: which arrays a polled site should have, a function of what was seen.
+//!   [`poll`]: which arrays a polled site should have, a function of what was seen; [`busy`]: whether a slot was free meanwhile.
 //!
 //! `tests/clusters` shows it whole on real engines.
 
+pub mod busy;
 pub mod camp;
 mod error;
 mod gridengine;

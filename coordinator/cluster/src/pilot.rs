@@ -8,6 +8,7 @@
 mod script;
 #[cfg(test)]
 mod tests;
+mod times;
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -17,6 +18,7 @@ use crate::queue::{Limits, Task, TaskId, TaskState};
 use crate::sites::{Cancelled, Kind, Site};
 
 pub use script::{Dials, script, token_file};
+pub use times::Times;
 
 /// Most allocations of a site that sets no limit.
 const ALLOCATIONS_MAX: u32 = 1_000;
@@ -56,6 +58,8 @@ pub struct Settings {
     pub array_max: u32,
     /// What becomes of an allocation that somebody deleted.
     pub cancelled: Cancelled,
+    /// How long an allocation may run.
+    pub times: Times,
 }
 
 impl Settings {
@@ -78,6 +82,11 @@ impl Settings {
             ahead: site.ahead,
             array_max: array_max.into_iter().flatten().min().unwrap_or(ARRAY_TASKS),
             cancelled: site.cancelled,
+            times: Times {
+                asked: site.time_limit,
+                usual: limits.time_usual,
+                most: limits.time,
+            },
         }
     }
 }
@@ -91,6 +100,8 @@ pub struct Wanted {
     pub unmeasured: u64,
     /// How long one thread takes over the others.
     pub time: Span,
+    /// How long it took over the dearest block that was measured.
+    pub dearest: Span,
     /// Threads of workers that are no allocations of this site.
     pub others: u64,
 }
@@ -137,6 +148,11 @@ pub struct Pilot {
     quiet_until: Timestamp,
     stopped: bool,
     standing: Standing,
+    wanted: Wanted,
+    /// How many times in a row allocations ended when nothing of what is wanted had been measured.
+    barren: u32,
+    /// Whether an allocation has ended well since that was counted last.
+    has_ended: bool,
     /// The allocation that failed last, and of which nobody has read what it said.
     failed: Option<(String, u32)>,
 }
@@ -167,6 +183,9 @@ impl Pilot {
             quiet_until: Timestamp(0),
             stopped: false,
             standing: Standing::default(),
+            wanted: Wanted::default(),
+            barren: 0,
+            has_ended: false,
             failed: None,
         }
     }
@@ -195,6 +214,11 @@ impl Pilot {
         (standing.waiting, standing.running, standing.wanted) = (0, 0, 0);
     }
 
+    /// How long the next allocation may run; `None`: as long as the queue lets it.
+    pub fn time_limit(&self) -> Option<Span> {
+        self.settings.times.limit(self.wanted.dearest, self.barren)
+    }
+
     /// Whether the latest allocations failed, or submissions were refused.
     pub fn is_failing(&self) -> bool {
         self.failures > 0
@@ -202,7 +226,13 @@ impl Pilot {
 
     /// Looks at what the queue shows of ours, and says what to do. Actions are done in order.
     pub fn observe(&mut self, now: Timestamp, shown: &[Task], wanted: Wanted) -> Vec<Action> {
+        self.wanted = wanted;
         let mut actions = self.follow(now, shown);
+        let has_ended = std::mem::take(&mut self.has_ended);
+        self.barren = match wanted.squares > 0 && wanted.unmeasured == wanted.squares {
+            true => self.barren.saturating_add(u32::from(has_ended)),
+            false => 0,
+        };
         let count = |of: &dyn Fn(&TaskState) -> bool| {
             let count = shown.iter().filter(|task| of(&task.state)).count();
             u32::try_from(count).unwrap_or(u32::MAX)
@@ -216,6 +246,9 @@ impl Pilot {
         self.standing.running = running;
         self.standing.wanted = target;
         self.note_held(shown);
+        if self.standing.trouble.is_none() {
+            self.standing.trouble = self.settings.times.too_short(wanted.dearest);
+        }
         let live = waiting.saturating_add(running);
         if live < target {
             actions.extend(self.submit(now, target - live));
@@ -319,6 +352,7 @@ impl Pilot {
         };
         match end {
             End::Well => {
+                self.has_ended = true;
                 self.failures = 0;
                 self.standing.trouble = None;
             }

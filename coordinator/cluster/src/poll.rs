@@ -7,6 +7,7 @@
 
 mod held;
 mod settings;
+mod stock;
 #[cfg(test)]
 mod tests;
 
@@ -18,12 +19,10 @@ use crate::orders::{Order, Seen, SeenArray, Stands, TaskOrder, Wants};
 
 use held::{Array, History, Tile};
 pub use settings::{ARRAY_TASKS, Settings};
+use stock::{Flow, Stock};
 
 /// Tries in a row that brought no block, after which a tile fails.
 const TRIES_MAX: u32 = 3;
-
-/// Images beyond those that the site's `ahead` asks for, at most.
-const RAISED_MAX: u32 = 63;
 
 /// A task asks for so many times what it is expected to take…
 const LIMIT_FACTOR: u64 = 4;
@@ -61,8 +60,6 @@ pub enum Action {
         /// Its task.
         task: u32,
     },
-    /// Submit an array; where that fails say so: [`Poll::refused`].
-    Submit(Order),
 }
 
 /// How a site stands, for people.
@@ -85,9 +82,7 @@ pub struct Poll {
     tiles: BTreeMap<AttemptId, Tile>,
     arrays: BTreeMap<String, Array>,
     histories: BTreeMap<(ImageRef, Rect), History>,
-    raised: u32,
-    /// Images of which the last block arrived since the last observation.
-    finished: u32,
+    stock: Stock,
     failures: u32,
     quiet_until: Timestamp,
     standing: Standing,
@@ -97,14 +92,13 @@ impl Poll {
     /// A site that holds nothing.
     pub fn new(settings: Settings) -> Self {
         Self {
+            stock: Stock::new(settings.ahead),
             settings,
             number: 0,
             observations: 0,
             tiles: BTreeMap::new(),
             arrays: BTreeMap::new(),
             histories: BTreeMap::new(),
-            raised: 0,
-            finished: 0,
             failures: 0,
             quiet_until: Timestamp(0),
             standing: Standing::default(),
@@ -118,16 +112,19 @@ impl Poll {
 
     /// Images that the site should hold.
     pub fn credit(&self) -> u32 {
-        1 + self
-            .settings
-            .ahead
-            .saturating_add(self.raised)
-            .min(RAISED_MAX)
+        self.stock.credit()
     }
 
     /// Whether there is anything at the site, or should be.
     pub fn is_empty(&self) -> bool {
         self.tiles.is_empty() && self.arrays.is_empty()
+    }
+
+    /// Grid squares, of 1,024 pixels each, that are leased to the site and not durable.
+    pub fn squares(&self) -> u64 {
+        let missing = self.tiles.values().flat_map(|tile| &tile.missing);
+        let pixels: u64 = missing.map(|block| block.area()).sum();
+        pixels.div_ceil(1_024)
     }
 
     /// The scenes of what is leased.
@@ -209,12 +206,9 @@ impl Poll {
                 begun.push(claim);
                 self.tiles.insert(claim.attempt, taken);
             }
-            let found = Array {
-                tiles,
-                is_sure: true,
-                time_limit: order.time_limit,
-                deleted: BTreeSet::new(),
-            };
+            let mut found = Array::new(tiles);
+            found.time_limit = order.time_limit;
+            found.waiting = count(array, Stands::Waits);
             self.arrays.insert(array.name.clone(), found);
         }
         begun
@@ -259,18 +253,15 @@ impl Poll {
         tile.arrived += 1;
         tile.took = tile.took + took;
         if tile.missing.is_empty() {
-            let image = tile.lease.image;
-            let key = (image, tile.lease.tile);
+            let key = (tile.lease.image, tile.lease.tile);
             self.histories.remove(&key);
             self.forget(attempt);
-            if !self.tiles.values().any(|tile| tile.lease.image == image) {
-                self.finished += 1;
-            }
         }
     }
 
-    /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do.
-    pub fn observe(&mut self, now: Timestamp, seen: &Seen) -> Vec<Action> {
+    /// Looks at what is there, of which all blocks that are wanted were delivered, and says what to do. What is leased
+    /// after that, since the [credit](Self::credit) is another now, still comes in time for [`Self::orders`].
+    pub fn observe(&mut self, seen: &Seen) -> Vec<Action> {
         self.observations += 1;
         let mut actions = Vec::new();
         let by_name: BTreeMap<_, _> = seen
@@ -280,18 +271,20 @@ impl Poll {
             .collect();
         self.follow(&by_name, &mut actions);
         self.tidy(&by_name, &mut actions);
-        // The stock did not last from one look to the next (thesis §C.3.5).
-        if self.finished >= self.credit() && self.raised < RAISED_MAX {
-            self.raised += 1;
-        }
-        self.finished = 0;
+        let flow = self.flow(&by_name);
+        self.stock.saw(flow);
         let (now_is, kept) = (self.observations, REMEMBERED);
         self.histories
             .retain(|_, history| history.observation + kept > now_is);
-        if now >= self.quiet_until {
-            self.submit(&mut actions);
-        }
         actions
+    }
+
+    /// Arrays to submit, in this order; where one fails say so: [`Self::refused`].
+    pub fn orders(&mut self, now: Timestamp) -> Vec<Order> {
+        match now >= self.quiet_until {
+            true => self.put_into_arrays(),
+            false => Vec::new(),
+        }
     }
 
     /// An array could not be submitted, or may have been: the next look says.
@@ -373,13 +366,9 @@ impl Poll {
         for (&name, there) in seen {
             waiting += count(there, Stands::Waits);
             running += count(there, Stands::Runs);
-            let array = self.arrays.entry(name.to_owned()).or_insert_with(|| Array {
-                // What nobody knows, nobody wants.
-                tiles: vec![None; there.tasks.len()],
-                is_sure: true,
-                time_limit: None,
-                deleted: BTreeSet::new(),
-            });
+            // What nobody knows, nobody wants.
+            let unknown = || Array::new(vec![None; there.tasks.len()]);
+            let array = self.arrays.entry(name.to_owned()).or_insert_with(unknown);
             array.is_sure |= there.is_submitted;
             let is_wanted = array.tiles.iter().any(Option::is_some);
             let live = (1..)
@@ -410,8 +399,36 @@ impl Poll {
         }
     }
 
+    /// How fast tasks begin, and how many images have begun.
+    fn flow(&mut self, seen: &BTreeMap<&str, &SeenArray>) -> Flow {
+        let mut flow = Flow::default();
+        for (name, array) in &mut self.arrays {
+            let there = seen.get(name.as_str());
+            let waiting = there.map_or(0, |there| count(there, Stands::Waits));
+            let before = std::mem::replace(&mut array.waiting, waiting);
+            if array.tiles.iter().any(Option::is_some) {
+                flow.tasks_begun += before.saturating_sub(waiting);
+            }
+        }
+        let mut images = BTreeMap::<ImageRef, (u32, bool)>::new();
+        for tile in self.tiles.values() {
+            let (tasks, has_begun) = images.entry(tile.lease.image).or_default();
+            *tasks += 1;
+            let array = tile
+                .place
+                .as_ref()
+                .and_then(|(name, _)| self.arrays.get(name));
+            *has_begun |= array.is_some_and(Array::has_begun);
+        }
+        flow.image_tasks = images.values().map(|image| image.0).max().unwrap_or(0);
+        let begun = images.values().filter(|image| image.1);
+        flow.begun = u32::try_from(begun.count()).unwrap_or(u32::MAX);
+        flow
+    }
+
     /// Puts what is leased and in no array into new ones, an image into as few as it takes.
-    fn submit(&mut self, actions: &mut Vec<Action>) {
+    fn put_into_arrays(&mut self) -> Vec<Order> {
+        let mut orders = Vec::new();
         let mut images = BTreeMap::<(ImageRef, Digest), Vec<AttemptId>>::new();
         for (&attempt, tile) in self.tiles.iter().filter(|(_, tile)| tile.place.is_none()) {
             let key = (tile.lease.image, tile.lease.scene);
@@ -431,14 +448,10 @@ impl Poll {
                         tasks.push(TaskOrder::from(&tile.lease));
                     }
                 }
-                let array = Array {
-                    tiles: attempts.iter().copied().map(Some).collect(),
-                    is_sure: true,
-                    time_limit,
-                    deleted: BTreeSet::new(),
-                };
+                let mut array = Array::new(attempts.iter().copied().map(Some).collect());
+                array.time_limit = time_limit;
                 self.arrays.insert(name.clone(), array);
-                actions.push(Action::Submit(Order {
+                orders.push(Order {
                     name,
                     scene: scene.to_string(),
                     job: image.job.0,
@@ -448,9 +461,10 @@ impl Poll {
                     running_max: self.settings.running_max,
                     time_limit,
                     tasks,
-                }));
+                });
             }
         }
+        orders
     }
 
     /// How long a task of these tiles may run: by the site's word, else by what is known of the dearest.

@@ -29,6 +29,8 @@ pub(crate) struct Costs {
     /// Pixels whose cost was ever measured, and their cost.
     pixels: u64,
     cost: u64,
+    /// The greatest cost of a grid square that was ever measured, of all its pixels in the window.
+    dearest: u64,
 }
 
 impl Costs {
@@ -40,7 +42,13 @@ impl Costs {
             measured: 0,
             pixels: 0,
             cost: 0,
+            dearest: 0,
         }
+    }
+
+    /// The greatest cost of a whole grid square that was ever measured; 0 before anything was.
+    pub(crate) fn dearest(&self) -> u64 {
+        self.dearest
     }
 
     /// Notes what a block cost.
@@ -54,6 +62,7 @@ impl Costs {
             self.newest = vec![0; count];
         }
         let cost = scale(cost, whole, block.area()).max(1);
+        self.dearest = self.dearest.max(cost);
         let Some(slot) = self.newest.get_mut(square) else {
             return;
         };

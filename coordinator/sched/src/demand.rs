@@ -13,6 +13,8 @@ pub struct Demand {
     pub unmeasured: u64,
     /// How long one thread of the usual speed would take over the others.
     pub time: Span,
+    /// How long it took over the dearest grid square that was measured of any of these jobs.
+    pub dearest: Span,
 }
 
 /// Pixels of a grid square.
@@ -36,6 +38,7 @@ impl Sched {
             }
             let squares = left.div_ceil(SQUARE_PIXELS);
             demand.squares = demand.squares.saturating_add(squares);
+            demand.dearest = demand.dearest.max(Span(job.costs.dearest()));
             match self.cost_left(job) {
                 Some(cost) => demand.time = demand.time + Span(cost),
                 None => demand.unmeasured = demand.unmeasured.saturating_add(squares),

@@ -2,7 +2,7 @@
 
 mod situation;
 
-use model::Revision;
+use model::{Revision, Span};
 use sched::{Command, Config, Demand, Event, Needs, Offer, Submission};
 use situation::*;
 
@@ -28,6 +28,8 @@ fn what_is_left_shrinks_as_it_is_done_and_not_as_it_is_leased() {
     farm.stores(1, 1, 0, block(0));
     let after = left(&farm);
     assert!(after.squares < before.squares, "{after:?}");
+    assert_eq!(before.dearest, Span(0));
+    assert!(after.dearest > Span(0), "{after:?}");
     farm.command(Command::Pause);
     assert_eq!(left(&farm).squares, 0);
     farm.command(Command::Resume);

@@ -24,6 +24,7 @@ const CALLS: [(&str, &[&str]); 4] = [
             "Farm/FetchFrame",
             "Farm/ListWorkers",
             "Farm/ListSites",
+            "Farm/LookBack",
             "Farm/Info",
         ],
     ),

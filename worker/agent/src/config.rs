@@ -6,13 +6,13 @@ use std::path::PathBuf;
 
 use model::Span;
 
-use crate::entry::Entry;
+use crate::admission::Admission;
 
 /// What a worker is started with. None of it changes a pixel.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// How it gets to the coordinator.
-    pub entry: Entry,
+    pub admission: Admission,
     /// What the worker calls itself, 1 to 200 bytes.
     pub name: String,
     /// Render threads; each renders one tile at a time.
@@ -35,9 +35,9 @@ pub struct Config {
 
 impl Config {
     /// A worker of so many threads, with the usual settings.
-    pub fn new(entry: Entry, name: impl Into<String>, threads: NonZeroU32) -> Self {
+    pub fn new(admission: Admission, name: impl Into<String>, threads: NonZeroU32) -> Self {
         Self {
-            entry,
+            admission,
             name: name.into(),
             threads,
             ahead: None,

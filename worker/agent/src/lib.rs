@@ -3,7 +3,7 @@
 //! One loop (`shell`) owns the session: it waits for whichever input is first, turns it into
 //! an event, lets the session decide, and performs the effects. Around it:
 //!
-//! - `entry`: how it gets to the coordinator: on this machine by a token, from another by a certificate.
+//! - `admission`: how it gets to the coordinator: on this machine by a token, from another by a certificate.
 //! - `link`: the two connections to the coordinator, and what passes on them.
 //! - `pool`: render threads, one tile each at a time, block by block.
 //! - `scenes`: descriptions and assets, fetched once and kept, in memory and on disk.
@@ -12,8 +12,8 @@
 //!
 //! It names no coordinator's code: they meet in `wire`. `tests/farm.rs` shows the whole.
 
+mod admission;
 mod config;
-mod entry;
 mod identity;
 mod images;
 mod input;
@@ -24,8 +24,8 @@ mod scenes;
 mod shell;
 mod stop;
 
+pub use admission::{Admission, Invitation};
 pub use config::{Config, RunError};
-pub use entry::{Entry, Invitation};
 pub use painter::{Assets, Cancelled, Counters, OpenImage, Painter, RenderPainter};
 pub use session::ExitReason;
 pub use shell::run;

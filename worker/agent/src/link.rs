@@ -16,7 +16,7 @@ use wire::convert;
 use wire::proto::{self, ErrorKind, control_down, control_up, deliver_down, deliver_up};
 use wire::{Failure, link};
 
-use crate::entry::Access;
+use crate::admission::Access;
 use crate::input::{Clients, Input, LinkNumber};
 
 /// Messages of the control stream that wait to be sent.

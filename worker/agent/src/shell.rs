@@ -16,8 +16,8 @@ use wire::link::Workers;
 use wire::proto::{Delivery, ErrorKind, control_down, deliver_down};
 use wire::{BadMessage, Failure, convert};
 
+use crate::admission::Access;
 use crate::config::{Config, RunError};
-use crate::entry::Access;
 use crate::identity;
 use crate::images::Images;
 use crate::input::{Block, Clients, Input, LinkNumber, Rendered};
@@ -140,7 +140,7 @@ impl Shell {
             session: Session::new(settings),
             origin,
             leave_at: config.time_limit.map(|limit| origin + useful(limit)),
-            access: Arc::new(Access::new(&config.entry)?),
+            access: Arc::new(Access::new(&config.admission)?),
             config,
             painter,
             inputs,
@@ -195,7 +195,7 @@ impl Shell {
                 self.feed(Event::Dialled).await;
             }
             Input::Connected(number, welcome) if self.is_newest(number) => {
-                tracing::info!(coordinator = %self.config.entry, epoch = welcome.epoch.0, "connected");
+                tracing::info!(coordinator = %self.config.admission, epoch = welcome.epoch.0, "connected");
                 self.feed(Event::Connected(welcome)).await;
             }
             Input::Control(number, message) if self.is_newest(number) => {

@@ -167,32 +167,34 @@ impl Ground {
         (forms[0].error < ERROR_MAX * (high - low)).then_some(ground)
     }
 
-    /// The function over a cell of the level whose cells are `scale` times as large as the first's; its corner is so many
-    /// sides from the eye, and in the level.
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "a level's number, and whole numbers in range"
-    )]
-    fn below(&self, bounds: &mut Bounds<'_>, scale: f64, corner: [f64; 2]) -> &Below {
-        let Level { side, blocks, .. } = &self.levels[(scale.to_bits() >> 52) as usize - 1023];
+    /// The functions over the cells of that block of the level whose cells are `scale` times as large as the first's.
+    #[inline]
+    #[expect(clippy::cast_possible_truncation, reason = "a level's number")]
+    fn block(&self, bounds: &mut Bounds<'_>, scale: f64, block: usize) -> &Block {
+        let level = &self.levels[(scale.to_bits() >> 52) as usize - 1023];
+        let known = level.blocks.get().and_then(|blocks| blocks[block].get());
+        known.unwrap_or_else(|| self.bounded(bounds, level, block))
+    }
+
+    /// The same of a block that no ray has come to yet.
+    #[cold]
+    #[inline(never)]
+    fn bounded<'a>(&self, bounds: &mut Bounds<'_>, level: &'a Level, block: usize) -> &'a Block {
         let row = 2 * self.half;
-        let blocks = blocks.get_or_init(|| {
+        let blocks = level.blocks.get_or_init(|| {
             let mut blocks = Vec::new();
             blocks.resize_with(row * row, OnceLock::new);
             blocks.into_boxed_slice()
         });
-        let [x, y] = corner.map(|cell| (cell + (self.half * SIDE) as f64) as usize);
-        let block = blocks[y / SIDE * row + x / SIDE].get_or_init(|| {
-            let first = [corner[0] - (x % SIDE) as f64, corner[1] - (y % SIDE) as f64];
-            self.block(bounds, *side, first)
-        });
-        &block[y % SIDE * SIDE + x % SIDE]
+        blocks[block].get_or_init(|| {
+            let first = [block % row, block / row]
+                .map(|blocks| (blocks * SIDE) as f64 - (self.half * SIDE) as f64);
+            self.bound(bounds, level.side, first)
+        })
     }
 
     /// The functions below the field over the cells of a block, whose first corner is so many sides from the eye.
-    #[cold]
-    fn block(&self, bounds: &mut Bounds<'_>, side: f64, first: [f64; 2]) -> Block {
+    fn bound(&self, bounds: &mut Bounds<'_>, side: f64, first: [f64; 2]) -> Block {
         let columns = self.columns(side, first);
         let mut forms = [Reduced::point(0.0); BLOCK];
         bounds.forms(&columns, &mut forms);

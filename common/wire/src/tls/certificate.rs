@@ -11,7 +11,7 @@ use yasna::{ASN1Error, ASN1ErrorKind, ASN1Result, BERReader, BERReaderSeq, Tag};
 
 /// What a certificate says. Times are whole seconds since 1970 (UTC).
 #[derive(Clone, PartialEq, Eq, Debug)]
-pub struct Facts {
+pub struct Claims {
     /// Whose it is: its subject's common name.
     pub name: String,
     /// It counts from then on.
@@ -31,17 +31,17 @@ pub enum Age {
     Expired,
 }
 
-impl Facts {
+impl Claims {
     /// Reads a certificate (DER). It is not verified here: TLS did that, or its reader wrote it.
     /// `None`: it is no certificate that a farm makes.
     pub fn read(certificate: &[u8]) -> Option<Self> {
         yasna::parse_der(certificate, |reader| {
             reader.read_sequence(|outer| {
-                let facts = outer.next().read_sequence(to_be_signed)?;
+                let claims = outer.next().read_sequence(to_be_signed)?;
                 // The signature's algorithm and the signature.
                 outer.next().read_der()?;
                 outer.next().read_der()?;
-                Ok(facts)
+                Ok(claims)
             })
         })
         .ok()
@@ -59,7 +59,7 @@ impl Facts {
     }
 }
 
-fn to_be_signed(fields: &mut BERReaderSeq<'_, '_>) -> ASN1Result<Facts> {
+fn to_be_signed(fields: &mut BERReaderSeq<'_, '_>) -> ASN1Result<Claims> {
     fields
         .next()
         .read_tagged(Tag::context(0), |version| version.read_i64())?;
@@ -83,7 +83,7 @@ fn to_be_signed(fields: &mut BERReaderSeq<'_, '_>) -> ASN1Result<Facts> {
     let name = name.ok_or(ASN1Error::new(ASN1ErrorKind::Invalid))?;
     // The key, and what the key may be used for.
     while fields.next().read_der().is_ok() {}
-    Ok(Facts {
+    Ok(Claims {
         name,
         not_before,
         not_after,
@@ -153,27 +153,27 @@ mod tests {
     fn a_certificate_says_whose_it_is_and_until_when() {
         // The second lies beyond 2050, which is written in another way.
         for until in [2_000, 4_000_000_000] {
-            let facts = Facts::read(&certificate(until)).unwrap();
-            assert_eq!(facts.name, "worker of token 7");
-            assert_eq!((facts.not_before, facts.not_after), (1_000, until));
-            assert_eq!(facts.age(999), Age::TooYoung);
-            assert_eq!(facts.age(until), Age::Alive);
-            assert_eq!(facts.age(until + 1), Age::Expired);
+            let claims = Claims::read(&certificate(until)).unwrap();
+            assert_eq!(claims.name, "worker of token 7");
+            assert_eq!((claims.not_before, claims.not_after), (1_000, until));
+            assert_eq!(claims.age(999), Age::TooYoung);
+            assert_eq!(claims.age(until), Age::Alive);
+            assert_eq!(claims.age(until + 1), Age::Expired);
         }
     }
 
     #[test]
     fn what_is_no_certificate_is_none() {
         let good = certificate(2_000);
-        assert_eq!(Facts::read(b""), None);
+        assert_eq!(Claims::read(b""), None);
         for end in 0..good.len() {
-            assert_eq!(Facts::read(&good[..end]), None, "{end}");
+            assert_eq!(Claims::read(&good[..end]), None, "{end}");
         }
         // Whatever a byte is changed to, reading ends with an answer.
         for place in 0..good.len() {
             let mut bad = good.clone();
             bad[place] ^= 0xff;
-            let _ = Facts::read(&bad);
+            let _ = Claims::read(&bad);
         }
     }
 

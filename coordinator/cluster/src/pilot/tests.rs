@@ -12,6 +12,10 @@ fn settings() -> Settings {
         ahead: 1,
         array_max: 100,
         cancelled: Cancelled::Replace,
+        times: Times {
+            usual: Some(HOUR),
+            ..Times::default()
+        },
     }
 }
 
@@ -20,6 +24,7 @@ const PLENTY: Wanted = Wanted {
     squares: 1_000_000,
     unmeasured: 0,
     time: Span(HOUR.0 * 1_000),
+    dearest: Span(0),
     others: 0,
 };
 
@@ -27,6 +32,7 @@ const NOTHING: Wanted = Wanted {
     squares: 0,
     unmeasured: 0,
     time: Span(0),
+    dearest: Span(0),
     others: 0,
 };
 
@@ -94,6 +100,7 @@ fn few_are_submitted_for_little_work() {
         squares,
         unmeasured: 0,
         time: Span::from_secs(60 * minutes),
+        dearest: Span(0),
         others,
     };
     assert_eq!(tasks(&mut pilot, wanted(1_000, 5, 0)), 10);
@@ -326,4 +333,42 @@ fn settings_follow_the_site_and_its_queue() {
     assert_eq!(of("kind = 'local'\nthreads = 3").running_max, Some(2));
     assert_eq!(of("kind = 'local'\nthreads = 30").running_max, Some(1));
     assert_eq!(of("kind = 'local'\nmax_running = 5").running_max, Some(5));
+}
+
+#[test]
+fn an_allocation_asks_for_as_long_as_a_block_needs() {
+    let unmeasured = Wanted {
+        unmeasured: PLENTY.squares,
+        ..PLENTY
+    };
+    let (mut pilot, mut shown) = running();
+    assert_eq!(pilot.time_limit(), Some(HOUR));
+    // All three end, one after the other, and nobody has learned anything.
+    for (number, doubled) in [(0, 2), (1, 4), (2, 8)] {
+        shown[number].state = TaskState::TimeLimit;
+        pilot.observe(NOW, &shown, unmeasured);
+        assert_eq!(pilot.time_limit(), Some(HOUR.times(doubled)));
+    }
+    let dearest = HOUR.times(3);
+    pilot.observe(NOW, &[], Wanted { dearest, ..PLENTY });
+    assert!(pilot.time_limit() > Some(HOUR.times(6)));
+    pilot.observe(NOW, &[], PLENTY);
+    assert_eq!(pilot.time_limit(), Some(HOUR));
+}
+
+#[test]
+fn where_no_block_is_done_in_the_time_that_the_site_says_it_is_told() {
+    let mut pilot = Pilot::new(Settings {
+        times: Times {
+            asked: Some(HOUR),
+            ..Times::default()
+        },
+        ..settings()
+    });
+    let dearest = HOUR.times(3);
+    pilot.observe(NOW, &[], Wanted { dearest, ..PLENTY });
+    let trouble = pilot.standing().trouble.clone().unwrap();
+    assert!(trouble.contains("10800 s"), "{trouble}");
+    pilot.observe(NOW, &[], PLENTY);
+    assert_eq!(pilot.standing().trouble, None);
 }

@@ -29,6 +29,8 @@ pub(super) struct Array {
     pub(super) tiles: Vec<Option<AttemptId>>,
     /// Whether it is known that it was submitted.
     pub(super) is_sure: bool,
+    /// Tasks that had not begun when it was last seen.
+    pub(super) waiting: u32,
     pub(super) time_limit: Option<Span>,
     /// Tasks that were deleted from here.
     pub(super) deleted: BTreeSet<u32>,
@@ -72,6 +74,21 @@ impl Tile {
 }
 
 impl Array {
+    /// One of which no task has begun.
+    pub(super) fn new(tiles: Vec<Option<AttemptId>>) -> Self {
+        Self {
+            is_sure: true,
+            waiting: u32::try_from(tiles.len()).unwrap_or(u32::MAX),
+            time_limit: None,
+            deleted: BTreeSet::new(),
+            tiles,
+        }
+    }
+
+    pub(super) fn has_begun(&self) -> bool {
+        usize::try_from(self.waiting).unwrap_or(usize::MAX) < self.tiles.len()
+    }
+
     pub(super) fn place(&self, task: u32) -> Option<usize> {
         let place = usize::try_from(task.checked_sub(1)?).ok()?;
         (place < self.tiles.len()).then_some(place)

@@ -60,29 +60,28 @@ fn attempt(number: u64) -> AttemptId {
 impl There {
     fn looks(&mut self) -> Vec<Action> {
         self.now = self.now + Span::from_secs(30);
-        let actions = self.poll.observe(self.now, &self.seen);
+        let actions = self.poll.observe(&self.seen);
         for action in &actions {
-            match action {
-                Action::Submit(order) => self.seen.arrays.push(SeenArray {
-                    name: order.name.clone(),
-                    is_submitted: true,
-                    order: Some(order.clone()),
-                    tasks: vec![SeenTask(Stands::Waits, 0); order.tasks.len()],
-                    had: Vec::new(),
-                }),
-                Action::Remove(names) => self.seen.arrays.retain(|a| !names.contains(&a.name)),
-                _ => {}
+            if let Action::Remove(names) = action {
+                self.seen.arrays.retain(|a| !names.contains(&a.name));
             }
         }
         actions
     }
 
     fn submits(&mut self) -> Vec<Order> {
-        let orders = self.looks().into_iter().filter_map(|action| match action {
-            Action::Submit(order) => Some(order),
-            _ => None,
-        });
-        orders.collect()
+        self.looks();
+        let orders = self.poll.orders(self.now);
+        self.seen
+            .arrays
+            .extend(orders.iter().map(|order| SeenArray {
+                name: order.name.clone(),
+                is_submitted: true,
+                order: Some(order.clone()),
+                tasks: vec![SeenTask(Stands::Waits, 0); order.tasks.len()],
+                had: Vec::new(),
+            }));
+        orders
     }
 
     fn are(&mut self, stands: Stands) {
@@ -276,26 +275,43 @@ fn arrays_of_nobody_are_ended_and_removed() {
 }
 
 #[test]
-fn where_the_stock_does_not_last_it_is_raised() {
+fn an_image_that_has_begun_is_no_stock() {
     let mut there = there();
-    for round in 0..3 {
-        let credit = u64::from(there.poll.credit());
-        assert_eq!(credit, 2 + round);
-        for image in 0..credit {
-            there
-                .poll
-                .leased(lease(image, u32::try_from(image).unwrap()));
-        }
-        there.looks();
-        for image in 0..credit {
-            there.brings(image, 2);
-        }
-        there.are(Stands::Ended);
-        there.looks();
+    for number in 0..8 {
+        there.poll.leased(lease(number, u32::from(number > 3)));
     }
-    there.poll.leased(lease(0, 0));
+    let orders = there.submits();
+    assert_eq!(there.poll.credit(), 2);
+    // The first image's last task runs beside the second's first: a third may come.
+    there.seen.arrays[0].tasks = vec![SeenTask(Stands::Runs, 0); 4];
+    there.seen.arrays[1].tasks[0] = SeenTask(Stands::Runs, 0);
+    assert_eq!(there.submits(), []);
+    assert_eq!(
+        there.poll.credit(),
+        5,
+        "two have begun, and five tasks in one look"
+    );
+    for number in 0..4 {
+        there.brings(number, 2);
+    }
+    there.seen.arrays[0].tasks = vec![SeenTask(Stands::Ended, 0); 4];
+    let remove = Action::Remove(vec![orders[0].name.clone()]);
+    assert_eq!(there.looks(), [remove]);
+    assert_eq!(there.poll.credit(), 3);
+}
+
+#[test]
+fn nothing_waits_where_the_site_says_so() {
+    let mut there = there();
+    there.poll = Poll::new(Settings {
+        ahead: 0,
+        ..there.poll.settings.clone()
+    });
+    for number in 0..4 {
+        there.poll.leased(lease(number, 0));
+    }
+    there.submits();
+    there.are(Stands::Runs);
     there.looks();
-    there.brings(0, 2);
-    there.looks();
-    assert_eq!(there.poll.credit(), 5);
+    assert_eq!(there.poll.credit(), 1);
 }

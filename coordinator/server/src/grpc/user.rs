@@ -208,6 +208,18 @@ impl Farm for Door {
         Ok(Response::new(proto::SiteList { sites }))
     }
 
+    async fn look_back(
+        &self,
+        request: Request<proto::LookBackRequest>,
+    ) -> Answer<proto::SiteLooks> {
+        let name = request.into_inner().site;
+        let looks = self.sites.looks(&name).ok_or_else(|| {
+            let said = format!("there is no site {:?}", wire::convert::sentence(&name, 64));
+            Failure::new(ErrorKind::NotFound, said)
+        })?;
+        Ok(Response::new(looks))
+    }
+
     async fn info(&self, _: Request<proto::InfoRequest>) -> Answer<proto::FarmInfo> {
         let info = self.ask(|reply| Input::Ask(Query::Info(reply))).await?;
         let space = self.space().await;

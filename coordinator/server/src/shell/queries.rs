@@ -126,6 +126,7 @@ impl Shell {
             squares: demand.squares,
             unmeasured: demand.unmeasured,
             time: demand.time,
+            dearest: demand.dearest,
             others: others.map(|view| u64::from(view.threads)).sum(),
         }
     }

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use cluster::busy::Look;
 use cluster::camp::Camp;
 use cluster::pilot::{self, Action, Pilot, Settings, Standing, Wanted};
 use cluster::survey::Program;
@@ -52,7 +53,6 @@ enum Found {
 /// A site in pilot mode that was looked at.
 struct Known {
     pilot: Pilot,
-    limits: Limits,
     /// Whether the queue was seen to hold nothing of ours.
     is_empty: bool,
     /// Whether the program was seen to be the right one.
@@ -163,7 +163,6 @@ impl Errand {
         let settings = Settings::of(site, &limits, names);
         Ok(Found::Pilot(Box::new(Known {
             pilot: Pilot::new(settings),
-            limits,
             is_empty: false,
             is_ready: false,
         })))
@@ -197,15 +196,21 @@ impl Errand {
             known.pilot.has_said(&said);
             tracing::warn!(site, array, task, said, "an allocation failed");
         }
-        self.show(known.pilot.standing());
-        let asked = unix_ms();
-        self.board.change(site, |site| site.asked_unix_ms = asked);
+        let standing = known.pilot.standing();
+        self.show(standing);
+        let look = Look {
+            at_unix_ms: unix_ms(),
+            running: standing.running,
+            waiting: standing.waiting,
+            ..Look::default()
+        };
+        self.board.saw(site, look);
         Ok(())
     }
 
     fn submit(&self, now: Timestamp, known: &mut Known, name: &str, tasks: u32) {
         let submitted = self.make_ready(known).and_then(|()| {
-            let array = self.array(&known.limits, name, tasks);
+            let array = self.array(known.pilot.time_limit(), name, tasks);
             self.camp.queue.submit(&array)
         });
         let site = &self.camp.site.name;
@@ -223,13 +228,7 @@ impl Errand {
         }
     }
 
-    fn array(&self, limits: &Limits, name: &str, tasks: u32) -> Array {
-        // One that asks for no time is given the queue's.
-        let time_limit = match (self.camp.site.time_limit, limits.time) {
-            (Some(ours), Some(most)) => Some(ours.min(most)),
-            (Some(ours), None) => Some(ours),
-            (None, _) => limits.time_usual,
-        };
+    fn array(&self, time_limit: Option<Span>, name: &str, tasks: u32) -> Array {
         Array {
             script: pilot::script(&self.camp, self.pass.dials(&self.coordinator), time_limit),
             log: self.camp.log(name),

@@ -21,7 +21,7 @@ use tokio_rustls::TlsAcceptor;
 use tokio_rustls::server::TlsStream;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::server::Connected;
-use wire::tls::certificate::Facts;
+use wire::tls::certificate::Claims;
 use wire::tls::{ALPN, VERSIONS, provider};
 
 use super::anytime::Anytime;
@@ -57,7 +57,7 @@ pub(crate) enum Line {
     /// In the clear, from elsewhere.
     Open,
     /// TLS; with the certificate that was shown and is this authority's, if one was.
-    Tls(Option<Arc<Facts>>),
+    Tls(Option<Arc<Claims>>),
 }
 
 /// What a connection gives to those who serve it.
@@ -160,18 +160,18 @@ async fn arrive(stream: TcpStream, peer: SocketAddr, tls: TlsAcceptor) -> io::Re
     }
     let stream = tls.accept(stream).await?;
     let shown = stream.get_ref().1.peer_certificates();
-    let facts = match shown.and_then(<[_]>::first) {
+    let claims = match shown.and_then(<[_]>::first) {
         None => None,
         Some(certificate) => {
-            let facts = Facts::read(certificate);
-            Some(Arc::new(facts.ok_or(io::ErrorKind::InvalidData)?))
+            let claims = Claims::read(certificate);
+            Some(Arc::new(claims.ok_or(io::ErrorKind::InvalidData)?))
         }
     };
     Ok(Connection {
         io: Io::Tls(Box::new(stream)),
         caller: Caller {
             peer,
-            line: Line::Tls(facts),
+            line: Line::Tls(claims),
         },
     })
 }

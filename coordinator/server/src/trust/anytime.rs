@@ -14,7 +14,7 @@ use rustls::{
     CertificateError, DigitallySignedStruct, DistinguishedName, Error, RootCertStore,
     SignatureScheme,
 };
-use wire::tls::certificate::Facts;
+use wire::tls::certificate::Claims;
 use wire::tls::provider;
 
 /// Takes no certificate, or one that the authority signed.
@@ -46,8 +46,8 @@ impl ClientCertVerifier for Anytime {
         intermediates: &[CertificateDer<'_>],
         _now: UnixTime,
     ) -> Result<ClientCertVerified, Error> {
-        let facts = Facts::read(end_entity).ok_or(CertificateError::BadEncoding)?;
-        let within = UnixTime::since_unix_epoch(Duration::from_secs(facts.not_after));
+        let claims = Claims::read(end_entity).ok_or(CertificateError::BadEncoding)?;
+        let within = UnixTime::since_unix_epoch(Duration::from_secs(claims.not_after));
         self.0.verify_client_cert(end_entity, intermediates, within)
     }
 

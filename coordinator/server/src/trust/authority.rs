@@ -20,7 +20,7 @@ use rustls::server::{ClientHello, ResolvesServerCert};
 use rustls::sign::CertifiedKey;
 use wire::Failure;
 use wire::proto::ErrorKind;
-use wire::tls::certificate::{Facts, fingerprint, now};
+use wire::tls::certificate::{Claims, fingerprint, now};
 use wire::tls::{COORDINATOR, provider};
 
 use crate::state::{StateError, io_error, replace, secret};
@@ -52,7 +52,7 @@ pub(crate) struct Authority {
 /// The coordinator's certificate.
 struct Own {
     key: Arc<CertifiedKey>,
-    facts: Facts,
+    claims: Claims,
 }
 
 impl std::fmt::Debug for Authority {
@@ -103,7 +103,7 @@ impl Authority {
     /// Until when the coordinator's own certificate counts, seconds since 1970.
     pub(crate) fn own_until(&self) -> u64 {
         let own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
-        own.facts.not_after
+        own.claims.not_after
     }
 
     /// When what it signs now would expire, seconds since 1970.
@@ -126,8 +126,8 @@ impl Authority {
     }
 
     /// The token that a worker's certificate was got by; `None` where it is not a worker's.
-    pub(crate) fn token_of(facts: &Facts) -> Option<u64> {
-        facts.name.strip_prefix(WORKER)?.parse().ok()
+    pub(crate) fn token_of(claims: &Claims) -> Option<u64> {
+        claims.name.strip_prefix(WORKER)?.parse().ok()
     }
 }
 
@@ -135,7 +135,7 @@ impl ResolvesServerCert for Authority {
     fn resolve(&self, _: ClientHello<'_>) -> Option<Arc<CertifiedKey>> {
         let mut current = self.own.lock().unwrap_or_else(PoisonError::into_inner);
         let now = now();
-        let left = current.facts.not_after.saturating_sub(now);
+        let left = current.claims.not_after.saturating_sub(now);
         // The second condition holds after a clock was set back.
         if left * 3 < self.life || left > self.life {
             match own(&self.key, &self.certificate, self.life) {
@@ -211,14 +211,14 @@ fn own(
     params.distinguished_name = name(COORDINATOR);
     params.extended_key_usages = vec![ExtendedKeyUsagePurpose::ServerAuth];
     let own = params.signed_by(&key, &issuer(authority)).map_err(said)?;
-    let facts = Facts::read(own.der()).ok_or("it cannot be read back")?;
+    let claims = Claims::read(own.der()).ok_or("it cannot be read back")?;
     // The authority goes along: clients know its fingerprint alone.
     let chain = vec![own.der().clone(), certificate.clone()];
     let key = PrivateKeyDer::try_from(key.serialize_der())?;
     let key = CertifiedKey::from_der(chain, key, &provider()).map_err(|error| error.to_string())?;
     Ok(Own {
         key: Arc::new(key),
-        facts,
+        claims,
     })
 }
 
@@ -285,10 +285,10 @@ mod tests {
         let authority = Authority::open(&path, Span::from_secs(60)).unwrap();
         let key = KeyPair::generate().unwrap();
         let signed = authority.sign_worker(key.public_key_raw(), 7).unwrap();
-        let facts = Facts::read(&signed).unwrap();
-        assert_eq!(Authority::token_of(&facts), Some(7));
-        assert!(facts.not_after <= authority.until() && facts.not_after + 5 > authority.until());
-        let own = Facts::read(authority.own.lock().unwrap().key.cert[0].as_ref()).unwrap();
+        let claims = Claims::read(&signed).unwrap();
+        assert_eq!(Authority::token_of(&claims), Some(7));
+        assert!(claims.not_after <= authority.until() && claims.not_after + 5 > authority.until());
+        let own = Claims::read(authority.own.lock().unwrap().key.cert[0].as_ref()).unwrap();
         assert_eq!(
             (own.name.as_str(), Authority::token_of(&own)),
             (COORDINATOR, None)

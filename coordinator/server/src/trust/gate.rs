@@ -13,7 +13,7 @@ use tonic::server::NamedService;
 use wire::Failure;
 use wire::auth::Token;
 use wire::proto::ErrorKind;
-use wire::tls::certificate::{Age, Facts, moment, now};
+use wire::tls::certificate::{Age, Claims, moment, now};
 
 use super::Trust;
 use super::acceptor::{Caller, Line};
@@ -132,7 +132,7 @@ impl Trust {
             };
         }
         match (shown, &caller.line) {
-            (Some(facts), _) => self.worker(facts),
+            (Some(claims), _) => self.worker(claims),
             (None, Line::Loopback) => self.owner.check(&metadata).map(|()| Who::Owner),
             (None, _) => Err(Failure::new(
                 ErrorKind::Unauthenticated,
@@ -154,27 +154,27 @@ impl Trust {
     }
 
     /// The worker whose certificate was shown, if it still counts.
-    fn worker(&self, facts: &Facts) -> Result<Who, Failure> {
+    fn worker(&self, claims: &Claims) -> Result<Who, Failure> {
         let refused = |sentence: String| Failure::new(ErrorKind::Unauthenticated, sentence);
         let clock = now();
-        match facts.age(clock) {
+        match claims.age(clock) {
             Age::Alive => {}
             Age::Expired => {
                 return Err(refused(format!(
                     "the worker's certificate counted until {}, and the coordinator's clock says {}: it was away for too long to renew it, or one of the two clocks is wrong; give the worker a new token (`flyby token create`)",
-                    moment(facts.not_after),
+                    moment(claims.not_after),
                     moment(clock)
                 )));
             }
             Age::TooYoung => {
                 return Err(refused(format!(
                     "the worker's certificate counts from {} on, and the coordinator's clock says {}: that clock was set back; let it follow a time server",
-                    moment(facts.not_before),
+                    moment(claims.not_before),
                     moment(clock)
                 )));
             }
         }
-        let token = Authority::token_of(facts);
+        let token = Authority::token_of(claims);
         let token = token.ok_or_else(|| refused("the certificate shown is no worker's".into()))?;
         self.tokens.check_certificates(token)?;
         Ok(Who::Worker { token })
@@ -218,12 +218,12 @@ mod tests {
         let state = crate::state::State::take(folder.path()).unwrap();
         let trust = Trust::open(&state, model::Span::from_secs(60)).unwrap();
         let refused = |name: &str, not_before, not_after| {
-            let facts = Facts {
+            let claims = Claims {
                 name: name.to_owned(),
                 not_before,
                 not_after,
             };
-            let failure = trust.worker(&facts).unwrap_err();
+            let failure = trust.worker(&claims).unwrap_err();
             assert_eq!(failure.kind, ErrorKind::Unauthenticated);
             failure.sentence
         };

@@ -80,6 +80,7 @@ const TABLE: &[(&str, Need)] = &[
     ("Farm/FetchFrame", Need::Role(Role::View)),
     ("Farm/ListWorkers", Need::Role(Role::View)),
     ("Farm/ListSites", Need::Role(Role::View)),
+    ("Farm/LookBack", Need::Role(Role::View)),
     ("Farm/Info", Need::Role(Role::View)),
     ("Farm/Submit", Need::Role(Role::Submit)),
     ("Farm/CancelJob", Need::Role(Role::Submit)),

@@ -209,11 +209,11 @@ impl Worker {
         painter: impl Painter,
     ) -> Self {
         let threads = NonZeroU32::new(threads).unwrap();
-        let entry = agent::Entry::Local {
+        let admission = agent::Admission::Local {
             coordinator: address,
             token: token.clone(),
         };
-        let config = agent::Config::new(entry, "test worker", threads);
+        let config = agent::Config::new(admission, "test worker", threads);
         let (asks, heard) = mpsc::channel(4);
         let run =
             tokio::spawn(

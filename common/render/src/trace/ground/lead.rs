@@ -4,7 +4,7 @@
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use super::{Below, Bounds, CAUTION, Ground, SIDE};
+use super::{BLOCK, Below, Bounds, CAUTION, Ground, SIDE};
 use crate::error::Cancelled;
 use crate::trace::bundle::Span;
 use crate::trace::tracer::Ray;
@@ -17,6 +17,12 @@ const NUDGE: f64 = 1e-4;
 
 /// How many times as large as the finest cells at a place the coarsest are that are tried there.
 const DEPTH: f64 = 128.0;
+
+/// One over the cells along a block's side; a power of two.
+const PER_SIDE: f64 = 1.0 / SIDE as f64;
+
+/// So many clear cells in a row let a ray try larger ones.
+const CLEAR_TO_GROW: f64 = 3.0;
 
 /// Most tries along one ray.
 const TRIES_MAX: f64 = 512.0;
@@ -38,15 +44,19 @@ struct Lanes {
     scale: Row,
     /// The same of the finest level that reaches where the ray is.
     finest: Row,
-    /// The corner of the cell that is tried, in sides, and the way to where the ray leaves it.
+    /// The corner of the cell that is tried, in sides.
     corner: [Row; 2],
+    /// Its block among those of its level, and where it is in the block.
+    block: [u32; LANES],
+    cell: [u32; LANES],
     /// What the cell says.
     value: Row,
     slope: [Row; 3],
-    /// Whether there is such a cell, whether the last one was clear, and whether the ray is done: 0 or 1.
+    /// Whether there is such a cell, and whether the ray is done: 0 or 1.
     exists: Row,
-    was_clear: Row,
     is_done: Row,
+    /// Cells in a row that were clear.
+    in_a_row: Row,
     tries: Row,
     /// The spans that the rays are of.
     span: [usize; LANES],
@@ -60,7 +70,7 @@ struct Scales {
     inverse_reach: f64,
     /// Of the coarsest level.
     last: f64,
-    /// Cells from the eye to the edge of a level.
+    /// Blocks from the eye to the edge of a level.
     half: f64,
     /// Below this height there is no ground.
     floor: f64,
@@ -89,6 +99,17 @@ fn power_above(a: f64) -> f64 {
     if a < 1.0 { 1.0 } else { power }
 }
 
+/// A whole number below 2³².
+#[inline(always)]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the low bits of 2⁵² and the number are the number"
+)]
+fn whole(a: f64) -> u32 {
+    const BITS: f64 = (1_u64 << 52) as f64;
+    (a + BITS).to_bits() as u32
+}
+
 impl Ground {
     /// Moves the start of every span to where the ground under its ray is no longer proven clear.
     pub(crate) fn lead(
@@ -104,7 +125,7 @@ impl Ground {
             inverse: 1.0 / first.side,
             inverse_reach: 1.0 / first.reach,
             last: (1_u64 << (self.levels.len() - 1)) as f64,
-            half: (self.half * SIDE) as f64,
+            half: self.half as f64,
             floor: self.frame.floor(),
         };
         let level = bounds.level;
@@ -122,16 +143,7 @@ impl Ground {
                 #[inline(always)]
                 || lanes.place(n, scales),
             );
-            for i in 0..n {
-                if lanes.exists[i] > 0.0 {
-                    let below = self.below(
-                        &mut bounds,
-                        lanes.scale[i],
-                        [0, 1].map(|axis| lanes.corner[axis][i]),
-                    );
-                    lanes.fetch(i, below);
-                }
-            }
+            lanes.ask(n, self, &mut bounds);
             level.vectorize(
                 #[inline(always)]
                 || lanes.go(n, scales),
@@ -167,11 +179,13 @@ impl Lanes {
             scale: row,
             finest: row,
             corner: [row; 2],
+            block: [0; LANES],
+            cell: [0; LANES],
             value: row,
             slope: [row; 3],
             exists: row,
-            was_clear: row,
             is_done: row,
+            in_a_row: row,
             tries: row,
             span: [0; LANES],
         }
@@ -195,7 +209,7 @@ impl Lanes {
         // The coarsest is tried first.
         self.scale[i] = f64::MAX;
         self.finest[i] = 1.0;
-        self.was_clear[i] = 1.0;
+        self.in_a_row[i] = CLEAR_TO_GROW;
         self.tries[i] = 0.0;
         self.span[i] = index;
     }
@@ -211,7 +225,7 @@ impl Lanes {
             &mut self.clear,
             &mut self.scale,
             &mut self.finest,
-            &mut self.was_clear,
+            &mut self.in_a_row,
             &mut self.tries,
         ]) {
             row[to] = row[from];
@@ -219,10 +233,19 @@ impl Lanes {
         self.span[to] = self.span[from];
     }
 
-    fn fetch(&mut self, i: usize, below: &Below) {
-        self.value[i] = below.value;
-        for (row, part) in self.slope.iter_mut().zip(below.slope.to_array()) {
-            row[i] = part;
+    /// Fetches what the cells say that are tried.
+    fn ask(&mut self, n: usize, ground: &Ground, bounds: &mut Bounds<'_>) {
+        // Known to be in range, the rows need no checks of their own.
+        assert!(n <= LANES);
+        for i in 0..n {
+            if self.exists[i] > 0.0 {
+                let block = ground.block(bounds, self.scale[i], self.block[i] as usize);
+                let Below { value, slope } = block[self.cell[i] as usize % BLOCK];
+                self.value[i] = value;
+                self.slope[0][i] = slope.x;
+                self.slope[1][i] = slope.y;
+                self.slope[2][i] = slope.z;
+            }
         }
     }
 
@@ -244,9 +267,15 @@ impl Lanes {
                 (way(0, ahead) * cells).floor(),
                 (way(1, ahead) * cells).floor(),
             );
-            let low = least(x, y) >= -scales.half;
-            let inside = (most(x, y) < scales.half) & (way(2, t) > scales.floor);
+            // In blocks, from the first corner of the level.
+            let (across, along) = (x * PER_SIDE + scales.half, y * PER_SIDE + scales.half);
+            let (column, row) = (across.floor(), along.floor());
+            let low = least(across, along) >= 0.0;
+            let inside = (most(column, row) < 2.0 * scales.half) & (way(2, t) > scales.floor);
             let exists = (finest <= scales.last) & low & inside;
+            let within = ((along - row) * SIDE as f64 + (across - column)) * SIDE as f64;
+            self.block[i] = whole(row * (2.0 * scales.half) + column);
+            self.cell[i] = whole(within);
             self.corner[0][i] = x;
             self.corner[1][i] = y;
             self.finest[i] = finest;
@@ -291,14 +320,19 @@ impl Lanes {
             let clear = if goes_on { clear } else { t };
             let is_last = !is_clear & (scale == self.finest[i]);
             let is_done = !goes_on | (clear >= end) | is_last | (self.tries[i] >= TRIES_MAX);
-            let grown = if self.was_clear[i] > 0.0 {
+            let in_a_row = if is_clear {
+                self.in_a_row[i] + 1.0
+            } else {
+                0.0
+            };
+            let grown = if in_a_row >= CLEAR_TO_GROW {
                 2.0 * scale
             } else {
                 scale
             };
             self.clear[i] = clear;
             self.scale[i] = if is_clear { grown } else { 0.5 * scale };
-            self.was_clear[i] = if is_clear { 1.0 } else { 0.0 };
+            self.in_a_row[i] = in_a_row;
             self.is_done[i] = if is_done { 1.0 } else { 0.0 };
             self.tries[i] += 1.0;
         }

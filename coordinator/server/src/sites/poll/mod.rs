@@ -8,9 +8,11 @@ mod scenes;
 use std::collections::BTreeSet;
 use std::time::{Duration, Instant};
 
+use cluster::busy::Look;
 use cluster::orders::{End, Order, Seen};
+use cluster::pilot::Wanted;
 use cluster::poll::{Action, Poll, Settings};
-use cluster::{ClusterError, Limits, survey};
+use cluster::{ClusterError, Limits, Site, survey};
 use model::{AttemptId, Lease, Span, Timestamp, WorkerId};
 use sched::{Event, Queue};
 use tokio::sync::mpsc;
@@ -83,6 +85,9 @@ impl<'a> Poller<'a> {
         let camp = &errand.camp;
         let names = format!("{}{}-", camp.prefix(), errand.epoch.0);
         let settings = Settings::of(&camp.site, &limits, names, errand.revision);
+        errand
+            .board
+            .has_slots(&camp.site.name, slots(&camp.site, &limits));
         Ok(Self {
             desk: Desk::new(camp)?,
             poll: Poll::new(settings),
@@ -193,8 +198,7 @@ impl<'a> Poller<'a> {
         let seen = self.fetch()?;
         // What was leased because of that.
         self.hear()?;
-        let now = self.now();
-        let actions = self.poll.observe(now, &seen);
+        let actions = self.poll.observe(&seen);
         // What is given back may come again at once.
         let comes_again = |action: &Action| matches!(action, Action::GiveBack(_));
         let may_tidy = !actions.iter().any(comes_again);
@@ -202,17 +206,26 @@ impl<'a> Poller<'a> {
             self.perform(action)?;
         }
         self.scenes.are(&seen.files);
-        if may_tidy {
-            self.tidy()?;
-        }
         if let Some(line) = &self.line {
             line.runs(self.poll.running());
         }
         self.wants()?;
+        // What is leased because of all this is submitted now, and not at the next look: a slot may be free.
+        let wanted = self.hear()?;
+        let submitted = self.submit()?;
+        if may_tidy {
+            self.tidy()?;
+        }
         self.show(None);
-        let asked = unix_ms();
-        let board = &self.errand.board;
-        board.change(self.name(), |site| site.asked_unix_ms = asked);
+        let standing = self.poll.standing();
+        let look = Look {
+            at_unix_ms: unix_ms(),
+            running: standing.running,
+            waiting: standing.waiting,
+            submitted,
+            has_more: wanted.squares > self.poll.squares(),
+        };
+        self.errand.board.saw(self.name(), look);
         Ok(())
     }
 
@@ -225,12 +238,7 @@ impl<'a> Poller<'a> {
             self.scenes.are(&seen.files);
             self.poll.takes_up(seen)
         });
-        let slots = [
-            site.max_running,
-            self.limits.running,
-            self.limits.slots.map(|(_, all)| all),
-        ];
-        let slots = slots.into_iter().flatten().min().unwrap_or(1);
+        let slots = slots(site, &self.limits).unwrap_or(1);
         let array_max = [site.max_array_size, self.limits.array_tasks];
         let array_max = array_max.into_iter().flatten().min();
         let hello = Hello {
@@ -288,17 +296,17 @@ impl<'a> Poller<'a> {
         Ok(())
     }
 
-    /// Hears all that was said until now: what the loop leases at a time comes whole.
-    fn hear(&mut self) -> Result<(), Trouble> {
+    /// Hears all that was said until now: what the loop leases at a time comes whole. Answers what the farm has for the site.
+    fn hear(&mut self) -> Result<Wanted, Trouble> {
         // The loop answers after all that it did before.
-        self.errand.wanted()?;
+        let wanted = self.errand.wanted()?;
         while let Some(line) = &mut self.line {
             match line.heard()? {
                 Some(message) => self.take(message),
                 None => break,
             }
         }
-        Ok(())
+        Ok(wanted)
     }
 
     fn take(&mut self, message: Message) {
@@ -339,7 +347,7 @@ impl<'a> Poller<'a> {
             match (end?, seen) {
                 (End::Whole, Some(seen)) => return Ok(seen),
                 // Others must not wait for what may take long.
-                _ => self.hear()?,
+                _ => drop(self.hear()?),
             }
         }
     }
@@ -378,28 +386,32 @@ impl<'a> Poller<'a> {
                     })?;
                 }
             }
-            Action::Submit(order) => self.submit(&order)?,
         }
         Ok(())
     }
 
-    fn submit(&mut self, order: &Order) -> Result<(), Trouble> {
-        let (name, tasks) = (&order.name, order.tasks.len());
-        match self.bring(order) {
-            Ok(id) => {
-                tracing::info!(site = self.name(), id, name, tasks, "an array is submitted");
-                self.poll.submitted();
+    /// Submits what is leased and in no array; answers how many tasks the queue took.
+    fn submit(&mut self) -> Result<u32, Trouble> {
+        let mut submitted = 0;
+        for order in self.poll.orders(self.now()) {
+            let (name, tasks) = (&order.name, order.tasks.len());
+            match self.bring(&order) {
+                Ok(id) => {
+                    tracing::info!(site = self.name(), id, name, tasks, "an array is submitted");
+                    self.poll.submitted();
+                    submitted += u32::try_from(tasks).unwrap_or(u32::MAX);
+                }
+                Err(Trouble::Site(error)) => {
+                    let words = words(&error);
+                    tracing::warn!(site = self.name(), name, tasks, "{words}");
+                    self.is_ready = false;
+                    let now = self.now();
+                    self.poll.refused(now, name, words);
+                }
+                Err(line) => return Err(line),
             }
-            Err(Trouble::Site(error)) => {
-                let words = words(&error);
-                tracing::warn!(site = self.name(), name, tasks, "{words}");
-                self.is_ready = false;
-                let now = self.now();
-                self.poll.refused(now, name, words);
-            }
-            Err(line) => return Err(line),
         }
-        Ok(())
+        Ok(submitted)
     }
 
     /// Sees once that the program there makes the same pixels; brings the scene where it is not there, and the order.
@@ -435,4 +447,11 @@ impl<'a> Poller<'a> {
             site.trouble = trouble.unwrap_or_default();
         });
     }
+}
+
+/// Tasks that may run at a time, by the site's word and its queue's; `None` where neither says.
+fn slots(site: &Site, limits: &Limits) -> Option<u32> {
+    let processors = limits.slots.map(|(_, all)| all / site.threads.max(1));
+    let slots = [site.max_running, limits.running, processors];
+    slots.into_iter().flatten().min().map(|slots| slots.max(1))
 }

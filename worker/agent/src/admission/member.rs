@@ -10,7 +10,7 @@ use tokio::time::Instant;
 use wire::Failure;
 use wire::link::{self, Workers};
 use wire::proto::{self, ErrorKind};
-use wire::tls::certificate::{Age, Facts, moment, now};
+use wire::tls::certificate::{Age, Claims, moment, now};
 use wire::tls::client::{self, Identity};
 use wire::way::Way;
 
@@ -40,7 +40,7 @@ pub(crate) struct Member {
 /// A certificate, and what is done with it.
 #[derive(Debug)]
 struct Standing {
-    facts: Facts,
+    claims: Claims,
     way: Way,
     /// When it is to be renewed.
     renew_at: Instant,
@@ -54,7 +54,7 @@ impl Member {
         let standing = place
             .certificate()
             .and_then(|kept| Standing::new(&invitation, &place, kept, Instant::now()).ok())
-            .filter(|standing| standing.facts.age(now()) == Age::Alive);
+            .filter(|standing| standing.claims.age(now()) == Age::Alive);
         Ok(Self {
             invitation,
             place,
@@ -68,10 +68,10 @@ impl Member {
         let mut standing = self.standing.lock().await;
         let expired = match &*standing {
             // Whether a certificate counts *yet* is for the coordinator to say.
-            Some(standing) if standing.facts.age(now()) != Age::Expired => {
+            Some(standing) if standing.claims.age(now()) != Age::Expired => {
                 return Ok(standing.way.clone());
             }
-            Some(standing) => Some(standing.facts.not_after),
+            Some(standing) => Some(standing.claims.not_after),
             None => None,
         };
         let got = self.join().await.map_err(|failure| match expired {
@@ -114,7 +114,7 @@ impl Member {
                 Ok((fresh, connection)) => {
                     fetching.send_replace(Some(connection));
                     tracing::info!(
-                        until = moment(fresh.facts.not_after),
+                        until = moment(fresh.claims.not_after),
                         "the worker's certificate is renewed"
                     );
                     *current = fresh;
@@ -124,7 +124,7 @@ impl Member {
                         reason = failure.sentence,
                         "the worker's certificate cannot be renewed now"
                     );
-                    let left = Duration::from_secs(current.facts.not_after.saturating_sub(now()));
+                    let left = Duration::from_secs(current.claims.not_after.saturating_sub(now()));
                     let wait = (left / 10).clamp(AGAIN_LEAST, AGAIN_MOST);
                     current.renew_at = Instant::now() + wait;
                 }
@@ -148,7 +148,7 @@ impl Member {
         let standing = self.taken(answer.await?)?;
         tracing::info!(
             token = file.id,
-            until = moment(standing.facts.not_after),
+            until = moment(standing.claims.not_after),
             "the worker has joined"
         );
         Ok(standing)
@@ -174,9 +174,9 @@ impl Member {
             certificate,
             now_unix_ms,
         } = answer;
-        let facts = Facts::read(&certificate).ok_or_else(|| unusable("it cannot be read"))?;
+        let claims = Claims::read(&certificate).ok_or_else(|| unusable("it cannot be read"))?;
         // Its life by the clock that it was made by, counted from here: no other clock matters.
-        let life = Duration::from_secs(facts.not_after.saturating_sub(now_unix_ms / 1_000));
+        let life = Duration::from_secs(claims.not_after.saturating_sub(now_unix_ms / 1_000));
         let renew_at = Instant::now() + life * 2 / 3;
         let standing = Standing::new(&self.invitation, &self.place, certificate.clone(), renew_at)?;
         self.place.keep(&certificate);
@@ -191,14 +191,14 @@ impl Standing {
         certificate: Vec<u8>,
         renew_at: Instant,
     ) -> Result<Self, Failure> {
-        let facts = Facts::read(&certificate).ok_or_else(|| unusable("it cannot be read"))?;
+        let claims = Claims::read(&certificate).ok_or_else(|| unusable("it cannot be read"))?;
         let identity = Identity {
             certificate,
             key: place.key.serialize_der(),
         };
         let config = client::config(invitation.file.authority, Some(identity)).map_err(unusable)?;
         Ok(Self {
-            facts,
+            claims,
             way: Way::tls(invitation.addresses(), config, None),
             renew_at,
         })

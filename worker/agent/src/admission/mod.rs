@@ -23,7 +23,7 @@ use member::Member;
 
 /// How a worker gets to its coordinator.
 #[derive(Clone, Debug)]
-pub enum Entry {
+pub enum Admission {
     /// It runs on this machine.
     Local {
         /// Where it listens.
@@ -47,7 +47,7 @@ pub struct Invitation {
 }
 
 /// Where it leads.
-impl fmt::Display for Entry {
+impl fmt::Display for Admission {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Local { coordinator, .. } => coordinator.fmt(f),
@@ -73,12 +73,14 @@ pub(crate) enum Access {
 }
 
 impl Access {
-    pub(crate) fn new(entry: &Entry) -> Result<Self, RunError> {
-        Ok(match entry {
-            Entry::Local { coordinator, token } => {
+    pub(crate) fn new(admission: &Admission) -> Result<Self, RunError> {
+        Ok(match admission {
+            Admission::Local { coordinator, token } => {
                 Self::Local(Way::local(*coordinator, token.clone()))
             }
-            Entry::Invited(invitation) => Self::Member(Box::new(Member::new(invitation.clone())?)),
+            Admission::Invited(invitation) => {
+                Self::Member(Box::new(Member::new(invitation.clone())?))
+            }
         })
     }
 
