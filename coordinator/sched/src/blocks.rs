@@ -3,10 +3,11 @@
 use alloc::boxed::Box;
 use alloc::vec::Vec;
 
-use model::{Digest, ImageRef, Span, WorkerId};
+use model::{Digest, ImageRef, Rect, Span, Timestamp, WorkerId};
 
 use crate::attempt::Attempt;
 use crate::check::{Check, Made};
+use crate::job::Job;
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
 use crate::verify::is_drawn;
@@ -23,6 +24,57 @@ struct Arrival {
     purpose: Purpose,
     elapsed: Span,
     pixels: Digest,
+}
+
+/// What a durable block added to its image.
+#[derive(Clone, Copy)]
+pub(crate) struct Added {
+    /// Pixels that were not durable before.
+    pub(crate) new: u64,
+    /// Its tile, while that is leased.
+    tile: Option<u32>,
+    tile_is_done: bool,
+    purpose: Purpose,
+}
+
+impl Added {
+    /// Its tile, where that is leased and nothing of it is left to render.
+    pub(crate) fn done_tile(self) -> Option<u32> {
+        self.tile.filter(|_| self.tile_is_done)
+    }
+}
+
+impl Job {
+    /// Counts the pixels of a durable block of an image that is not over.
+    pub(crate) fn add_durable(&mut self, place: u32, rect: Rect, now: Timestamp) -> Option<Added> {
+        let work = match self.state(place) {
+            // Nobody had begun it: its beginning was in another epoch.
+            ImageState::Waiting => self.begin(place),
+            _ => self.work.get_mut(&place)?,
+        };
+        let new = work.pixels.add(rect);
+        let mut added = Added {
+            new,
+            tile: work.tile_of(rect),
+            tile_is_done: false,
+            purpose: Purpose::First,
+        };
+        if let Some(tile) = added.tile.and_then(|tile| work.tiles.get_mut(tile)) {
+            tile.missing -= new;
+            added.tile_is_done = tile.missing == 0 && tile.check.is_none();
+            if tile.trouble.on_purpose {
+                added.purpose = Purpose::Second;
+            }
+            if new > 0 {
+                tile.trouble.losses = 0;
+            }
+        }
+        let tally = &mut self.tally;
+        tally.pixels_done += new;
+        tally.blocks_done += u64::from(new > 0);
+        tally.started.get_or_insert(now);
+        Some(added)
+    }
 }
 
 /// Whose pixels of a block are durable.
@@ -67,35 +119,19 @@ impl Sched {
         let Some(job) = self.jobs.get_mut(&image.job) else {
             return;
         };
-        let work = match job.state(place) {
-            // A durable block of an image that nobody had begun: its beginning was in another epoch.
-            ImageState::Waiting => Some(job.begin(place)),
-            _ => job.work.get_mut(&place),
-        };
-        let Some(work) = work else {
+        let Some(added) = job.add_durable(place, rect, self.now) else {
             return;
         };
-        let new = work.pixels.add(rect);
+        let Added {
+            new, tile, purpose, ..
+        } = added;
         // Nobody is found to lie where nothing is verified.
-        if new > 0 && self.config.verify > 0 {
+        if new > 0
+            && self.config.verify > 0
+            && let Some(work) = job.work.get_mut(&place)
+        {
             work.makers.insert(worker);
         }
-        let tile = work.tile_of(rect);
-        let mut tile_done = false;
-        let mut purpose = Purpose::First;
-        if let Some(tile) = tile.and_then(|tile| work.tiles.get_mut(tile)) {
-            tile.missing -= new;
-            tile_done = tile.missing == 0 && tile.check.is_none();
-            if tile.trouble.on_purpose {
-                purpose = Purpose::Second;
-            }
-            if new > 0 {
-                tile.trouble.losses = 0;
-            }
-        }
-        job.tally.pixels_done += new;
-        job.tally.blocks_done += u64::from(new > 0);
-        job.tally.started.get_or_insert(self.now);
         // What an attempt delivered that nobody knows any more counts all the same.
         let is_recalled =
             attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
@@ -112,7 +148,7 @@ impl Sched {
             pixels,
         };
         self.credit_attempt(worker, &arrival, out);
-        if let Some(tile) = tile.filter(|_| tile_done) {
+        if let Some(tile) = added.done_tile() {
             self.tile_done(image, tile, worker, out);
         }
         self.finish_image(image, out);
@@ -134,7 +170,7 @@ impl Sched {
     }
 
     /// The place of the image that a durable block belongs to; `None` where that has all its pixels.
-    fn place_of_block(&self, block: BlockRef) -> Result<Option<u32>, BlockRefusal> {
+    pub(crate) fn place_of_block(&self, block: BlockRef) -> Result<Option<u32>, BlockRefusal> {
         let job = self.jobs.get(&block.image.job);
         let job = job.ok_or(BlockRefusal::AttemptDead)?;
         let place = job.place(block.image.image);
@@ -243,7 +279,13 @@ impl Sched {
 
     /// Ends the attempts at a tile of which every pixel is durable. One that has
     /// delivered all it was leased for knows; the others are told.
-    fn tile_done(&mut self, image: ImageRef, tile: u32, by: WorkerId, out: &mut Vec<Effect>) {
+    pub(crate) fn tile_done(
+        &mut self,
+        image: ImageRef,
+        tile: u32,
+        by: WorkerId,
+        out: &mut Vec<Effect>,
+    ) {
         let verify = self.config.verify;
         let Some((job, place)) = self.job_and_place(image) else {
             return;

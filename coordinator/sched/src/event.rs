@@ -18,7 +18,8 @@ use crate::{Command, Needs, Offer};
 /// block (`tests/histories.rs`); what is lost is who renders what, and how fast.
 ///
 /// A store need not keep what later events made superfluous: the number of a job that was forgotten, the blocks of
-/// an image that is encoded. [`Event::JobsRecalled`] and [`Event::ImageRecalled`] stand for those (`tests/recall.rs`).
+/// an image that is encoded. [`Event::JobsRecalled`] and [`Event::ImageRecalled`] stand for those, and
+/// [`Event::BlocksRecalled`] for all that is left of an image's blocks (`tests/recall.rs`).
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub enum Event {
     /// A user submitted a job. Answered by [`crate::Effect::Submitted`] or
@@ -64,6 +65,13 @@ pub enum Event {
         blocks: u32,
         /// How long they took, each on one thread.
         render_time: Span,
+    },
+    /// Blocks of an image that is not over were durable in an earlier epoch: told by a store in place of what stored them.
+    BlocksRecalled {
+        /// The image.
+        image: ImageRef,
+        /// Each block, and how long one thread took to render it.
+        blocks: Vec<(Rect, Span)>,
     },
     /// An image could not be stored or encoded, or [`crate::Effect::GiveUp`] was heard; the job goes on without it.
     ImageFailed {
@@ -119,7 +127,8 @@ pub enum Event {
         /// Why, a sentence for the user.
         reason: String,
     },
-    /// A worker will not render these tiles.
+    /// A worker will not render these tiles. It gets no others before its next [`Event::Credit`] or [`Event::Heartbeat`],
+    /// but where it stands for a queue.
     GivenBack {
         /// The worker.
         worker: WorkerId,
@@ -154,6 +163,7 @@ impl Event {
             | Self::ImageEncoded { .. }
             | Self::JobsRecalled { .. }
             | Self::ImageRecalled { .. }
+            | Self::BlocksRecalled { .. }
             | Self::ImageFailed { .. }
             | Self::Command { .. } => true,
             Self::WorkerJoined { .. }

@@ -39,6 +39,7 @@ impl Sched {
         if link > worker.newest {
             // The worker says anew what it wants, when it has read what is still its own.
             worker.credit = 0;
+            worker.is_full = false;
         }
         worker.newest = link;
         worker.link = Link::Open;
@@ -142,14 +143,19 @@ impl Sched {
 
     pub(crate) fn credit(&mut self, id: WorkerId, credit: u32) {
         if let Some(place) = self.heard(id) {
-            self.workers[place].credit = credit.min(self.config.limits.credit_max);
+            let worker = &mut self.workers[place];
+            worker.credit = credit.min(self.config.limits.credit_max);
+            worker.is_full = false;
             self.worker_changed(place);
         }
     }
 
     pub(crate) fn heartbeat(&mut self, id: WorkerId, running: &[Running], out: &mut Vec<Effect>) {
-        if self.heard(id).is_none() {
+        let Some(place) = self.heard(id) else {
             return;
+        };
+        if core::mem::take(&mut self.workers[place].is_full) {
+            self.worker_changed(place);
         }
         for report in running {
             let Some(number) = self.owned(id, report.attempt) else {
@@ -204,7 +210,13 @@ impl Sched {
     }
 
     pub(crate) fn given_back(&mut self, id: WorkerId, attempts: &[AttemptId]) {
-        self.heard(id);
+        let Some(place) = self.heard(id) else {
+            return;
+        };
+        // Leased at once again, it would be given back again, as fast as the link is. A queue gives back what is to be cut anew.
+        let worker = &mut self.workers[place];
+        worker.is_full = worker.offer.queue.is_none();
+        self.worker_changed(place);
         for &attempt in attempts {
             if let Some(number) = self.owned(id, attempt) {
                 self.end_attempt(number);

@@ -1,10 +1,10 @@
 //! What a store tells a new epoch instead of the events that it no longer keeps.
 
-use model::{Digest, ImageRef, JobId, Rect, Span};
+use model::{AttemptId, Digest, Epoch, ImageRef, JobId, Rect, Span, WorkerId};
 
 use crate::job::Job;
 use crate::pace::{SPEED_USUAL, cost_of};
-use crate::{Effect, ImageState, Sched};
+use crate::{BlockRef, Effect, ImageState, Sched};
 
 use alloc::vec::Vec;
 
@@ -39,7 +39,55 @@ impl Sched {
         self.job_changed(image.job);
         self.end_job_if_done(image.job, out);
     }
+
+    /// Blocks are durable of which nobody knows any more who rendered them.
+    pub(crate) fn blocks_recalled(
+        &mut self,
+        image: ImageRef,
+        blocks: &[(Rect, Span)],
+        out: &mut Vec<Effect>,
+    ) {
+        let now = self.now;
+        let mut done = Vec::new();
+        for &(rect, elapsed) in blocks {
+            let block = BlockRef {
+                attempt: LONG_AGO,
+                image,
+                rect,
+            };
+            let Ok(Some(place)) = self.place_of_block(block) else {
+                continue;
+            };
+            let Some(job) = self.jobs.get_mut(&image.job) else {
+                return;
+            };
+            let Some(added) = job.add_durable(place, rect, now) else {
+                continue;
+            };
+            if added.new > 0 {
+                job.recall_block(place, rect, elapsed);
+            }
+            done.extend(added.done_tile());
+        }
+        for tile in done {
+            self.tile_done(image, tile, NOBODY, out);
+        }
+        self.finish_image(image, out);
+        self.job_changed(image.job);
+    }
 }
+
+/// Whose recalled blocks are: nobody's that is known any more.
+const NOBODY: WorkerId = WorkerId {
+    id: 0,
+    incarnation: 0,
+};
+
+/// The attempt of recalled blocks, which is of no epoch that there was.
+const LONG_AGO: AttemptId = AttemptId {
+    epoch: Epoch(0),
+    number: 0,
+};
 
 impl Job {
     /// Notes what a block of an earlier epoch took. Whose it was is forgotten, so it counts as of usual speed.

@@ -117,6 +117,7 @@ impl Sched {
                 blocks,
                 render_time,
             } => self.image_recalled(image, film, (blocks, render_time), out),
+            Event::BlocksRecalled { image, blocks } => self.blocks_recalled(image, &blocks, out),
             Event::ImageFailed { image, reason } => self.image_failed(image, reason, out),
             Event::Command { job, command } => self.command(job, command, out),
             Event::WorkerJoined {

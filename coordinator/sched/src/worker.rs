@@ -23,6 +23,8 @@ pub(crate) struct Worker {
     pub(crate) newest: LinkId,
     pub(crate) link: Link,
     pub(crate) credit: u32,
+    /// Whether it gave something back, and has not said since that it wants more: it may hold what counts as delivered here.
+    pub(crate) is_full: bool,
     /// Its live attempts, in the order in which they were leased.
     pub(crate) live: Vec<u64>,
     /// Where it stands for a queue: the images of which it holds tiles, and how many of each.
@@ -75,6 +77,7 @@ impl Worker {
             newest: link,
             link: Link::Open,
             credit: 0,
+            is_full: false,
             live: Vec::new(),
             images: BTreeMap::new(),
             idle: 0,
@@ -121,7 +124,7 @@ impl Worker {
             None => self.live.len(),
             Some(_) => self.images.len(),
         };
-        held < self.credit as usize
+        !self.is_full && held < self.credit as usize
     }
 
     /// Notes that it got a tile of an image.

@@ -2,10 +2,9 @@
 
 mod situation;
 
-use model::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Span, SubmissionId, WorkerId};
+use model::{ImageNumber, ImageRef, JobId, Rect, Span, SubmissionId};
 use sched::{
-    BlockRef, Command, Config, Effect, Event, ImageState, JobOutcome, JobState, Submission,
-    SubmitRefusal,
+    Command, Config, Effect, Event, ImageState, JobOutcome, JobState, Submission, SubmitRefusal,
 };
 use situation::{EPOCH, Farm, film, submission, tile};
 
@@ -63,23 +62,19 @@ fn an_image_that_is_recalled_is_done_and_counted() {
 fn a_worker_is_leased_only_what_is_not_recalled() {
     let mut farm = farm();
     farm.job(3).is_told(recalled(1, 1));
-    let stored = Event::BlockStored {
-        worker: WorkerId {
-            id: 0,
-            incarnation: 0,
-        },
-        block: BlockRef {
-            attempt: AttemptId {
-                epoch: Epoch(0),
-                number: 0,
-            },
-            image: image(1, 0),
-            rect: tile(0).blocks().next().unwrap(),
-        },
-        elapsed: Span::from_millis(300),
-        pixels: film(0),
+    let block = tile(0).blocks().next().unwrap();
+    let none = Rect {
+        x0: 0,
+        y0: 0,
+        x1: 1_000_000,
+        y1: 1,
     };
-    farm.is_told(stored);
+    // Told twice it counts once, and what is no block counts for nothing.
+    let took = Span::from_millis(300);
+    farm.is_told(Event::BlocksRecalled {
+        image: image(1, 0),
+        blocks: vec![(block, took), (none, took), (block, took)],
+    });
     let view = farm.sched.job(JobId(1)).unwrap();
     assert_eq!(view.render_time, Span::from_millis(7_300));
     farm.joins(1, &[]).is_told(Event::Credit {
@@ -97,6 +92,24 @@ fn a_worker_is_leased_only_what_is_not_recalled() {
     assert!(leases.iter().all(|lease| lease.image != image(1, 1)));
     let blocks: usize = leases.iter().map(|lease| lease.blocks().count()).sum();
     assert_eq!(blocks, 4 + 3, "two images but one block");
+}
+
+#[test]
+fn an_image_all_of_whose_blocks_are_recalled_is_encoded() {
+    let mut farm = farm();
+    farm.job(1).worker(1, 2).never_mind();
+    let blocks = (0..2).flat_map(|index| tile(index).blocks());
+    farm.is_told(Event::BlocksRecalled {
+        image: image(1, 0),
+        blocks: blocks.map(|block| (block, Span::from_millis(1))).collect(),
+    });
+    let effects = farm.never_mind();
+    assert!(effects.contains(&Effect::Encode { image: image(1, 0) }));
+    // Whoever was at work on it is told, told again or not.
+    let revoked = |effect: &&Effect| matches!(effect, Effect::Revoke { .. });
+    assert_eq!(effects.iter().filter(revoked).count(), 2);
+    let view = farm.sched.job(JobId(1)).unwrap();
+    assert_eq!((view.pixels_done, view.blocks_done), (view.pixels, 4));
 }
 
 #[test]

@@ -526,6 +526,25 @@ fn what_is_given_back_goes_to_another() {
     assert!(farm.sched.worker(worker(1)).is_none());
 }
 
+/// It would give the same back again and again, as fast as the link is.
+#[test]
+fn who_gives_back_is_leased_nothing_until_it_says_that_it_wants_more() {
+    let mut farm = farm();
+    farm.job(1).worker(1, 2).never_mind();
+    let give_back = |number| Event::GivenBack {
+        worker: worker(1),
+        attempts: vec![attempt(number)],
+    };
+    farm.is_told(give_back(2)).wants(&[]);
+    farm.wants_tiles(1, 2).wants(&[lease(1, 3, 0, 1)]);
+    farm.is_told(give_back(3)).wants(&[]);
+    let heartbeat = Event::Heartbeat {
+        worker: worker(1),
+        running: Vec::new(),
+    };
+    farm.is_told(heartbeat).wants(&[lease(1, 4, 0, 1)]);
+}
+
 #[test]
 fn blocks_are_asked_for_before_they_are_written() {
     let mut farm = farm();

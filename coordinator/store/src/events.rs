@@ -2,30 +2,18 @@
 
 use std::collections::BTreeSet;
 
-use model::{AttemptId, Epoch, ImageRef, JobId, WorkerId};
-use sched::{BlockRef, Command, Event, Submission};
+use model::{ImageRef, JobId};
+use sched::{Command, Event, Submission};
 
 use crate::{Recalled, RecalledBlock, RecalledImage, RecalledJob};
-
-/// Whose the recalled blocks are: nobody's that is known any more.
-const NOBODY: WorkerId = WorkerId {
-    id: 0,
-    incarnation: 0,
-};
-
-/// The attempt of the recalled blocks, which is of no epoch that there was.
-const LONG_AGO: AttemptId = AttemptId {
-    epoch: Epoch(0),
-    number: 0,
-};
 
 impl Recalled {
     /// The events that bring everything back, in order, each with when it happened by the coordinator's calendar,
     /// in milliseconds since 1970.
     ///
     /// Job by job: its number, its submission, its commands, its images that are over, its blocks, and that
-    /// it was cancelled. The blocks of an image come in one run. Effects of these events are those of
-    /// any others; the acknowledgements among them are for nobody. The last event tells the largest job number.
+    /// it was cancelled. The blocks of an image come in one event. Effects of these events are those of
+    /// any others. The last event tells the largest job number.
     pub fn events(&self) -> impl Iterator<Item = (u64, Event)> {
         let kept: BTreeSet<JobId> = self.jobs.iter().map(|job| job.job).collect();
         let end = self.jobs.last().map_or(0, |job| job.unix_ms);
@@ -69,8 +57,8 @@ impl RecalledJob {
             .chain(self.images.iter().map(move |image| image.event(job)))
             .chain(
                 self.blocks
-                    .iter()
-                    .map(move |block| (self.unix_ms, block.event(job))),
+                    .chunk_by(|a, b| a.image == b.image)
+                    .filter_map(move |blocks| Some((self.unix_ms, blocks_event(job, blocks)?))),
             )
             .chain(cancel)
     }
@@ -109,20 +97,12 @@ impl RecalledImage {
     }
 }
 
-impl RecalledBlock {
-    fn event(&self, job: JobId) -> Event {
-        Event::BlockStored {
-            worker: NOBODY,
-            block: BlockRef {
-                attempt: LONG_AGO,
-                image: ImageRef {
-                    job,
-                    image: self.image,
-                },
-                rect: self.rect,
-            },
-            elapsed: self.elapsed,
-            pixels: self.pixels,
-        }
-    }
+/// The blocks of one image.
+fn blocks_event(job: JobId, blocks: &[RecalledBlock]) -> Option<Event> {
+    let image = blocks.first()?.image;
+    let blocks = blocks.iter().map(|block| (block.rect, block.elapsed));
+    Some(Event::BlocksRecalled {
+        image: ImageRef { job, image },
+        blocks: blocks.collect(),
+    })
 }

@@ -42,6 +42,9 @@ const LINKS: usize = 2;
 /// Room for a few jobs, and for what SQLite keeps beside its file.
 const DISK: &str = "32m";
 
+/// One in how many leases may be given back.
+const GIVEN_BACK_PART: u64 = 20;
+
 const ONE_THREAD: [&str; 2] = ["--threads", "1"];
 
 #[test]
@@ -140,8 +143,15 @@ impl Chaos {
         // But for acknowledgements that a killed coordinator had decided and not come to, the witness saw them all.
         let acknowledged = self.witness.acknowledged_count() as u64;
         assert!(acknowledged * 10 >= self.tally.blocks * 9 && self.witness.leases > 0);
+        // A worker that holds too much may be leased something, but not the same again and again.
+        let given_back = self.witness.given_back;
+        assert!(
+            given_back * GIVEN_BACK_PART <= self.witness.leases,
+            "{given_back} of {} leases were given back",
+            self.witness.leases
+        );
         eprintln!(
-            "{:#?}\n{} tiles leased, {} blocks acknowledged, none leased after that; {} leased to two before",
+            "{:#?}\n{} tiles leased, {given_back} of them given back, {} blocks acknowledged, none leased after that; {} leased to two before",
             self.tally, self.witness.leases, acknowledged, self.witness.rendered_twice
         );
     }

@@ -34,6 +34,8 @@ pub(super) struct Witness {
     read: usize,
     /// Tiles that were leased.
     pub(super) leases: u64,
+    /// Those of them that workers gave back.
+    pub(super) given_back: u64,
     /// Blocks that were delivered by another attempt than the first: each was leased to both before it was there.
     pub(super) rendered_twice: u64,
 }
@@ -54,6 +56,8 @@ impl Witness {
                 self.acknowledged(ack);
             } else if let Some((_, lease)) = line.split_once(": effect effect=Lease ") {
                 self.leased(lease);
+            } else if let Some((_, event)) = line.split_once(": event event=GivenBack ") {
+                self.given_back += event.matches("AttemptId").count() as u64;
             }
         }
     }

@@ -43,8 +43,8 @@ pub(crate) struct Clients {
 pub(crate) enum Rendered {
     /// A block is rendered.
     Block(Box<Block>),
-    /// A tile is rendered, or was stopped.
-    Tile(AttemptId),
+    /// The last block of a tile is rendered.
+    Last(Box<Block>),
     /// A tile cannot be rendered.
     Failed(AttemptId, String),
 }

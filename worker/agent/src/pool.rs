@@ -134,7 +134,8 @@ pub(crate) enum Paused {
 
 /// How a tile ended.
 enum Ended {
-    Rendered,
+    /// All of it; this is its last block.
+    Rendered(Box<Block>),
     /// Nobody wants it, or nobody listens.
     Dropped,
     Failed(String),
@@ -149,7 +150,7 @@ impl Shared {
                 said(|| self.render_tile(&tile, &mut scratch)).unwrap_or_else(Ended::Failed);
             self.work().cancels.remove(&attempt);
             let report = match ended {
-                Ended::Rendered => Rendered::Tile(attempt),
+                Ended::Rendered(last) => Rendered::Last(last),
                 Ended::Failed(reason) => Rendered::Failed(attempt, reason),
                 Ended::Dropped => continue,
             };
@@ -175,17 +176,21 @@ impl Shared {
             Ok(image) => image,
             Err(reason) => return Ended::Failed(reason),
         };
-        for rect in tile.lease.blocks() {
+        let mut left = tile.lease.blocks().peekable();
+        while let Some(rect) = left.next() {
             if !self.may_go_on(tile) {
                 return Ended::Dropped;
             }
             match render_block(tile, rect, &*image, scratch) {
+                Ok(Some(block)) if left.peek().is_none() => {
+                    return Ended::Rendered(Box::new(block));
+                }
                 Ok(Some(block)) => self.say(Rendered::Block(Box::new(block))),
                 Ok(None) => return Ended::Dropped,
                 Err(reason) => return Ended::Failed(reason),
             }
         }
-        Ended::Rendered
+        Ended::Failed("the lease names no block".to_owned())
     }
 
     /// Waits while rendering is paused; whether the tile is still wanted then.

@@ -68,6 +68,15 @@ impl Scenes {
         Ok(scene)
     }
 
+    /// A scene, if it is here and none is being fetched.
+    pub(crate) fn at_hand(&self, digest: Digest) -> Option<Arc<Scene>> {
+        let mut kept = self.kept.try_lock().ok()?;
+        let place = kept.iter().position(|scene| scene.digest == digest)?;
+        let scene = kept.remove(place);
+        kept.push(scene.clone());
+        Some(scene)
+    }
+
     async fn fetch(
         &self,
         digest: Digest,

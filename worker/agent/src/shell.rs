@@ -20,7 +20,7 @@ use crate::admission::Access;
 use crate::config::{Config, RunError};
 use crate::identity;
 use crate::images::Images;
-use crate::input::{Clients, Input, LinkNumber, Rendered};
+use crate::input::{Block, Clients, Input, LinkNumber, Rendered};
 use crate::link::Link;
 use crate::painter::Painter;
 use crate::pool::Pool;
@@ -64,7 +64,16 @@ pub async fn run(
                 Some(Ask::Drain) => shell.feed(Event::DrainAsked).await,
                 None => heard = false,
             },
-            Some(input) = taken.recv() => shell.take(input).await,
+            Some(input) = taken.recv() => {
+                shell.take(input).await;
+                // For what has come meanwhile no timer need be set anew.
+                for _ in 1..INPUTS_MAX {
+                    match taken.try_recv() {
+                        Ok(input) if shell.exit.is_none() => shell.take(input).await,
+                        _ => break,
+                    }
+                }
+            }
             () = wait_until(tick_at) => shell.feed(Event::Tick).await,
             () = wait_until(leave_at) => {
                 tracing::info!("the time limit is near: what is rendered is delivered, and the rest is given back");
@@ -221,18 +230,24 @@ impl Shell {
 
     async fn rendered(&mut self, rendered: Rendered) {
         match rendered {
-            Rendered::Block(block) => {
-                let (attempt, rect) = (block.attempt, block.rect);
-                self.blocks.insert((attempt, rect), block.delivery);
-                self.feed(Event::BlockRendered { attempt, rect }).await;
+            Rendered::Block(block) => self.rendered_block(*block).await,
+            Rendered::Last(block) => {
+                let attempt = block.attempt;
+                self.rendered_block(*block).await;
+                self.feed(Event::TileRendered { attempt }).await;
             }
-            Rendered::Tile(attempt) => self.feed(Event::TileRendered { attempt }).await,
             Rendered::Failed(attempt, reason) => {
                 self.loading.remove(&attempt);
                 tracing::warn!(%attempt, reason, "a tile cannot be rendered");
                 self.feed(Event::RenderFailed { attempt, reason }).await;
             }
         }
+    }
+
+    async fn rendered_block(&mut self, block: Block) {
+        let (attempt, rect) = (block.attempt, block.rect);
+        self.blocks.insert((attempt, rect), block.delivery);
+        self.feed(Event::BlockRendered { attempt, rect }).await;
     }
 
     /// The link is gone; the session hears whether that is for good.

@@ -4,6 +4,10 @@
 //! finish what it has. So a worker wants as many tiles ahead as its threads render in
 //! two round trips, and one more. Both times are measured: a round trip from a block's sending to
 //! its acknowledgement, with which the next lease comes; a tile from its start to its last block.
+//!
+//! What is measured is not all: where a machine is busy, or a disk slow for a while, it says too little. So a worker that holds all it
+//! asked for, and a thread of which has nothing to begin, *starves*: it asks for twice as many ahead at once, again as soon as
+//! it has those and starves still, and comes back to what is measured bit by bit.
 
 use model::{AttemptId, Rect, Span, Timestamp};
 
@@ -18,6 +22,8 @@ const ROUND_TRIPS: u64 = 2;
 pub(crate) struct Ahead {
     round_trip: Option<Span>,
     tile: Option<Span>,
+    /// What it took lately that no thread waits, as far as was found by waiting.
+    reach: u64,
     /// A block on its way, and when it was sent. One at a time is watched.
     watched: Option<(AttemptId, Rect, Timestamp)>,
 }
@@ -48,11 +54,24 @@ impl Ahead {
         note(&mut self.tile, took);
     }
 
-    /// How many tiles to hold ahead; `None` while that is not known.
-    pub(crate) fn tiles(&self, threads: u32) -> Option<u64> {
-        let (round_trip, tile) = (self.round_trip?, self.tile?);
-        let wait = round_trip.times(ROUND_TRIPS).times(u64::from(threads));
-        Some(1 + wait.0.div_ceil(tile.0.max(1)))
+    /// So many tiles ahead are not enough.
+    pub(crate) fn starves(&mut self, tiles: u32) {
+        self.reach = self.reach.max(u64::from(tiles.max(1)) * 2);
+    }
+
+    /// A while has passed.
+    pub(crate) fn settles(&mut self) {
+        self.reach -= self.reach.div_ceil(NEWEST);
+    }
+
+    /// How many tiles to hold ahead, `unmeasured` where nothing is known.
+    pub(crate) fn tiles(&self, threads: u32, unmeasured: u32) -> u64 {
+        let measured = self.round_trip.zip(self.tile).map(|(round_trip, tile)| {
+            let wait = round_trip.times(ROUND_TRIPS).times(u64::from(threads));
+            1 + wait.0.div_ceil(tile.0.max(1))
+        });
+        let measured = measured.unwrap_or(u64::from(unmeasured));
+        measured.max(self.reach)
     }
 }
 

@@ -102,8 +102,8 @@ impl Session {
         self.coordinator.away_since = None;
         // Another epoch numbers its attempts anew.
         self.newest = self.newest.filter(|newest| newest.epoch == welcome.epoch);
-        self.send_credit(out);
         self.reconcile(&welcome, out);
+        self.send_credit(out);
         self.resend_all(out);
     }
 
@@ -202,6 +202,7 @@ impl Session {
             })
             .collect();
         out.push(Effect::SendHeartbeat { running });
+        self.ahead.settles();
         if self.credit() != self.credit_told {
             self.send_credit(out);
         }

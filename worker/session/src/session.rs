@@ -35,6 +35,8 @@ pub struct Session {
     pub(crate) ahead: Ahead,
     /// The credit that the coordinator was told last.
     pub(crate) credit_told: u32,
+    /// Whether a lease was given back since: the coordinator waits to hear that there is room.
+    pub(crate) turned_away: bool,
     pub(crate) leaving: Leaving,
     /// Since when there is nothing to do.
     pub(crate) idle_since: Option<Timestamp>,
@@ -93,6 +95,7 @@ impl Session {
             paused: false,
             ahead: Ahead::default(),
             credit_told: 0,
+            turned_away: false,
             leaving: Leaving::No,
             idle_since: None,
             tiles_delivered: 0,
@@ -134,6 +137,7 @@ impl Session {
         }
         if self.leaving != Leaving::Gone {
             self.start_tiles(out);
+            self.ask_for_more(out);
             self.leave_if_done(out);
         }
         self.note_idleness();

@@ -7,7 +7,7 @@ use model::{AttemptId, Lease, Rect};
 
 use crate::held::{Held, Phase};
 use crate::leave::Leaving;
-use crate::{BlockVerdict, Effect, Session};
+use crate::{BlockVerdict, Config, Effect, Session};
 
 impl Session {
     /// How many tiles the worker wants to hold in all (thesis C.3.5).
@@ -20,16 +20,39 @@ impl Session {
 
     /// How many of them it does not render.
     fn ahead(&self) -> u32 {
-        match self.ahead.tiles(self.config.threads) {
-            Some(tiles) => u32::try_from(tiles)
-                .unwrap_or(u32::MAX)
-                .max(self.config.ahead_least)
-                .min(self.config.ahead_max),
-            None => self.config.ahead,
+        let Config {
+            threads,
+            ahead,
+            ahead_least,
+            ahead_max,
+            ..
+        } = self.config;
+        let tiles = u32::try_from(self.ahead.tiles(threads, ahead)).unwrap_or(u32::MAX);
+        tiles.max(ahead_least).min(ahead_max)
+    }
+
+    /// Asks for more where a thread has nothing to begin though all that was asked for is here, or where there is
+    /// room again after a lease was given back.
+    pub(crate) fn ask_for_more(&mut self, out: &mut Vec<Effect>) {
+        if !self.link.is_up() || self.leaving != Leaving::No {
+            return;
+        }
+        let held = self.held.len();
+        let waits = self.running < self.config.threads && !self.paused;
+        let starves = waits && held >= self.credit_told as usize;
+        if starves {
+            let ahead = self.credit_told.saturating_sub(self.config.threads);
+            self.ahead.starves(ahead);
+        }
+        let credit = self.credit();
+        let has_room = self.turned_away && held < credit as usize;
+        if (starves && credit > self.credit_told) || has_room {
+            self.send_credit(out);
         }
     }
 
     pub(crate) fn send_credit(&mut self, out: &mut Vec<Effect>) {
+        self.turned_away = false;
         self.credit_told = self.credit();
         out.push(Effect::SendCredit {
             credit: self.credit_told,
@@ -47,6 +70,7 @@ impl Session {
         let has_room = self.held.len() < (self.credit() as usize).saturating_mul(2);
         if !has_room || self.newest.is_some_and(|newest| attempt <= newest) {
             let attempts = vec![attempt];
+            self.turned_away = true;
             return out.push(Effect::GiveBack { attempts });
         }
         self.newest = Some(attempt);

@@ -89,7 +89,7 @@ fn an_attempt_is_never_started_twice() {
         .is_told(revoked(1))
         .wants(&[start(1), cancel(1)])
         .leased([1])
-        .wants(&[give_back(&[1])]);
+        .wants(&[give_back(&[1]), Effect::SendCredit { credit: 2 }]);
 }
 
 #[test]
@@ -97,6 +97,18 @@ fn a_lease_beyond_twice_the_credit_is_given_back() {
     let mut worker = Situation::connected(config());
     worker.leased(1..=4).wants(&[start(1)]);
     worker.leased([5]).wants(&[give_back(&[5])]);
+    // The coordinator waits to hear that there is room again: it wants to hold two.
+    let credit = Effect::SendCredit { credit: 2 };
+    let mut said = Vec::new();
+    for number in 1..=3 {
+        for index in 0..2 {
+            worker.is_told(rendered(number, index));
+            worker.is_told(acked(number, index));
+        }
+        let effects = worker.is_told(tile_rendered(number)).never_mind();
+        said.push(effects.contains(&credit));
+    }
+    assert_eq!(said, [false, false, true]);
 }
 
 #[test]
@@ -218,10 +230,10 @@ fn what_died_while_it_was_away_is_forgotten() {
     worker.is_told(lost()).waits(Span::from_millis(100));
     worker.is_told(Event::Dialled).never_mind();
     worker.is_told(welcome(&[2, 9])).wants(&[
-        Effect::SendCredit { credit: 2 },
         cancel(1),
         drop_block(1, 0),
         give_back(&[9]),
+        Effect::SendCredit { credit: 2 },
         start(2),
     ]);
 }
@@ -233,9 +245,9 @@ fn another_epoch_knows_nothing_of_what_is_held() {
     worker.is_told(lost()).waits(Span::from_millis(100));
     worker.is_told(Event::Dialled).never_mind();
     worker.is_told(welcome_in(Epoch(4), &[])).wants(&[
-        Effect::SendCredit { credit: 2 },
         cancel(1),
         drop_block(1, 0),
+        Effect::SendCredit { credit: 2 },
     ]);
     assert_eq!(worker.session.summary().waiting, 0);
 }

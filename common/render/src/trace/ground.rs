@@ -169,7 +169,6 @@ impl Ground {
 
     /// The functions over the cells of that block of the level whose cells are `scale` times as large as the first's.
     #[inline]
-    #[expect(clippy::cast_possible_truncation, reason = "a level's number")]
     fn block(&self, bounds: &mut Bounds<'_>, scale: f64, block: usize) -> &Block {
         let level = &self.levels[(scale.to_bits() >> 52) as usize - 1023];
         let known = level.blocks.get().and_then(|blocks| blocks[block].get());

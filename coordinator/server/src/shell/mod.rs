@@ -46,6 +46,9 @@ const WATCH_INTERVAL: Duration = Duration::from_millis(100);
 /// coordinator is thus heard before anyone is blamed for being silent during it.
 const INPUTS_BEFORE_TICK: u32 = 8_192;
 
+/// Inputs that are taken one after another before the disk is heard again.
+const INPUTS_AT_ONCE: u32 = 64;
+
 /// Everything that the loop owns.
 #[derive(Debug)]
 pub(crate) struct Shell {
@@ -161,11 +164,9 @@ impl Shell {
                 }
                 // Where much waits for the disk, whoever would add to it waits too.
                 input = inputs.recv(), if !tick_is_overdue && !self.is_full() => {
-                    since_tick += 1;
-                    match input {
-                        Some(input) => self.take(input),
-                        None => break Ok(()),
-                    }
+                    let Some(input) = input else { break Ok(()) };
+                    self.take(input);
+                    since_tick += 1 + self.take_more(&mut inputs);
                 }
                 () = wait_until(tick_at) => {
                     since_tick = 0;
@@ -179,6 +180,17 @@ impl Shell {
         drop((news, inputs));
         self.end().await;
         ended
+    }
+
+    /// Takes what has come meanwhile, for which no timer need be set anew; says how many inputs that were.
+    fn take_more(&mut self, inputs: &mut mpsc::Receiver<Input>) -> u32 {
+        let mut taken = 0;
+        while taken < INPUTS_AT_ONCE && !self.is_full() {
+            let Ok(input) = inputs.try_recv() else { break };
+            self.take(input);
+            taken += 1;
+        }
+        taken
     }
 
     fn is_full(&self) -> bool {

@@ -2,11 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::num::NonZeroUsize;
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::thread;
 
-use image::{ImageError, Scratch};
-use model::{ImageNumber, ImageRef, JobId, Rect, Timestamp};
+use image::Scratch;
+use model::{ImageRef, JobId, Rect, Timestamp};
 use sched::Effect;
 use store::{Entry, Recalled, RecalledBlock, RecalledImage, RecalledJob, Sqlite, Store as _};
 
@@ -29,35 +29,29 @@ impl Kept {
     /// Reads the store, and opens the scratch files of images that were being rendered. Blocks whose
     /// pixels are not there any more are forgotten, and rendered again.
     pub(crate) fn read(state: &State, store: &mut Sqlite) -> Result<(Self, Open), StartError> {
-        let mut recalled = store.recall()?;
+        let mut recalled = store.recall_jobs()?;
         let mut jobs = BTreeMap::new();
-        let mut open = Open::new();
-        for job in &mut recalled.jobs {
+        for job in &recalled.jobs {
             let (plan, scene) = plan(state, job)?;
-            if !job.blocks.is_empty() {
-                plan.folders.make()?;
-            }
-            // The store gives them image by image.
-            let images = job.blocks.chunk_by(|a, b| a.image == b.image);
-            let mut gone = BTreeSet::new();
-            for (number, reopened) in reopen_all(&plan, job.job, images.collect()) {
-                let image = ImageRef {
-                    job: job.job,
-                    image: number,
-                };
-                let (scratch, lost) = reopened.map_err(StartError::Scratch)?;
-                open.insert(image, Arc::new(scratch));
-                if !lost.is_empty() {
-                    tracing::error!(job = %image.job, image = %number, blocks = lost.len(), "blocks are not on the disk as they were written; they are rendered again");
-                    gone.extend(lost.iter().map(|rect| (number, corners(rect))));
-                    store.commit(&[Entry::BlocksLost { image, rects: lost }])?;
-                }
-            }
-            if !gone.is_empty() {
-                job.blocks
-                    .retain(|block| !gone.contains(&(block.image, corners(&block.rect))));
-            }
             jobs.insert(job.job, (Arc::new(plan), scene));
+        }
+        let mut open = Open::new();
+        let reopened = reopen_all(store, |image| Some(jobs.get(&image.job)?.0.clone()))?;
+        let mut of_job = recalled.jobs.iter_mut().peekable();
+        for (image, (mut blocks, reopened)) in reopened {
+            let (scratch, lost) = reopened?;
+            open.insert(image, Arc::new(scratch));
+            if !lost.is_empty() {
+                tracing::error!(job = %image.job, image = %image.image, blocks = lost.len(), "blocks are not on the disk as they were written; they are rendered again");
+                let gone: BTreeSet<_> = lost.iter().map(corners).collect();
+                blocks.retain(|block| !gone.contains(&corners(&block.rect)));
+                store.commit(&[Entry::BlocksLost { image, rects: lost }])?;
+            }
+            // Both are in order.
+            while of_job.next_if(|job| job.job < image.job).is_some() {}
+            if let Some(job) = of_job.peek_mut() {
+                job.blocks.append(&mut blocks);
+            }
         }
         let known = jobs.keys().copied().collect();
         state.clean(&known, &open.keys().copied().collect())?;
@@ -72,40 +66,56 @@ impl Kept {
     }
 }
 
-type Reopened = Result<(Scratch, Vec<Rect>), ImageError>;
+/// What was noted of an image, its scratch file, and which of its blocks that does not hold.
+type Reopened = (Vec<RecalledBlock>, Result<(Scratch, Vec<Rect>), StartError>);
 
-/// Opens the scratch files of images of a job and reads back what was noted of them, several at a time: every
-/// byte of them is looked at.
+/// Reads the durable blocks of all images, and meanwhile opens the scratch files of those that are read, several at a
+/// time: every byte of them is looked at.
 fn reopen_all(
-    plan: &Plan,
-    job: JobId,
-    images: Vec<&[RecalledBlock]>,
-) -> Vec<(ImageNumber, Reopened)> {
+    store: &mut Sqlite,
+    plan_of: impl Fn(ImageRef) -> Option<Arc<Plan>> + Sync,
+) -> Result<BTreeMap<ImageRef, Reopened>, StartError> {
     let threads = thread::available_parallelism().map_or(1, NonZeroUsize::get);
-    let reopen = |blocks: &[RecalledBlock]| {
-        let number = blocks.first()?.image;
-        let image = ImageRef { job, image: number };
-        let noted = blocks.iter().map(|block| (block.rect, block.pixels));
-        let path = plan.scratch_path(image);
-        let identity = plan.identity_of(image);
-        let reopened = Scratch::reopen_bare(path, identity, plan.window, noted);
-        Some((number, reopened))
+    let (noted, images) = mpsc::sync_channel::<(ImageRef, Vec<RecalledBlock>)>(threads);
+    let images = Mutex::new(images);
+    let next = || images.lock().unwrap_or_else(PoisonError::into_inner).recv();
+    let reopen_some = || {
+        let mut reopened = Vec::new();
+        while let Ok((image, blocks)) = next() {
+            if let Some(plan) = plan_of(image) {
+                let scratch = reopen(&plan, image, &blocks);
+                reopened.push((image, (blocks, scratch)));
+            }
+        }
+        reopened
     };
     thread::scope(|scope| {
-        let share = images.len().div_ceil(threads).max(1);
-        let parts: Vec<_> = images
-            .chunks(share)
-            .map(|part| {
-                let reopen = &reopen;
-                scope.spawn(move || part.iter().filter_map(|blocks| reopen(blocks)).collect())
-            })
-            .collect();
-        let joined = parts.into_iter().flat_map(|part| {
-            let part: Vec<_> = part.join().expect("opening a file does not panic");
-            part
+        let openers: Vec<_> = (0..threads).map(|_| scope.spawn(reopen_some)).collect();
+        let read = store.recall_blocks(|image, blocks| {
+            noted
+                .send((image, blocks))
+                .expect("they take all that there is");
         });
-        joined.collect()
+        drop(noted);
+        let opened = openers.into_iter().flat_map(|opener| {
+            let some: Vec<_> = opener.join().expect("opening a file does not panic");
+            some
+        });
+        let opened = opened.collect();
+        read?;
+        Ok(opened)
     })
+}
+
+fn reopen(
+    plan: &Plan,
+    image: ImageRef,
+    blocks: &[RecalledBlock],
+) -> Result<(Scratch, Vec<Rect>), StartError> {
+    let noted = blocks.iter().map(|block| (block.rect, block.pixels));
+    plan.folders.make()?;
+    let (path, identity) = (plan.scratch_path(image), plan.identity_of(image));
+    Scratch::reopen_bare(path, identity, plan.window, noted).map_err(StartError::Scratch)
 }
 
 type Corners = [u32; 4];
@@ -159,7 +169,6 @@ impl Shell {
         for (unix_ms, event) in recalled.events() {
             let then = Timestamp(unix_ms.saturating_mul(1_000)).min(latest);
             self.sched.handle(then, event, &mut effects);
-            // Every block is acknowledged, to nobody: a million of those are not kept until the end.
             wanted.extend(effects.drain(..).filter(still_wanted));
         }
         for effect in wanted {

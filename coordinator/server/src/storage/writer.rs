@@ -5,6 +5,7 @@ use std::collections::btree_map::Entry as Place;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender};
+use std::time::{Duration, Instant};
 
 use image::Scratch;
 use model::ImageRef;
@@ -16,14 +17,19 @@ use super::encoder::Encoding;
 use super::{Encoded, Open, Order, Plan, Stored, Ticket, chain};
 use crate::input::News;
 
-/// Most blocks and records that are made durable together. More would delay the first one's
-/// acknowledgement, and save nothing: a sync's cost is spread thin already.
-pub(super) const GROUP_MAX: usize = 256;
+/// Most blocks and records that are made durable together, and bytes of pixels. More would delay the first one's
+/// acknowledgement, and save little: a sync's cost is spread thin already, even where a disk takes a tenth of a second.
+pub(super) const GROUP_MAX: usize = 2_048;
+const GROUP_BYTES_MAX: usize = 8 << 20;
 
 /// From so many blocks and records on, or so many bytes of pixels, a group is written while the one before it is
 /// committed. Less waits for that, and for what comes meanwhile: a sync for little costs as much as one for all.
 const PIPELINED_MIN: usize = 64;
 const PIPELINED_BYTES_MIN: usize = 256 << 10;
+
+/// How long a group that is worth no sync of its own waits for more blocks. Two syncs and a handful of wake-ups cost a
+/// processor a millisecond; workers hold tiles ahead for as long as acknowledgements take.
+const LINGER: Duration = Duration::from_millis(50);
 
 /// The thread that owns the scratch files.
 pub(super) struct Writer {
@@ -39,6 +45,8 @@ pub(super) struct Writer {
 #[derive(Default)]
 struct Group {
     blocks: Vec<(Arc<Plan>, Stored)>,
+    /// Of their pixels.
+    bytes: usize,
     records: Vec<Entry>,
     ticket: Option<Ticket>,
 }
@@ -48,12 +56,17 @@ impl Group {
         self.blocks.len() + self.records.len()
     }
 
+    /// Whether it may wait for more: for records somebody waits.
+    fn may_linger(&self) -> bool {
+        self.records.is_empty() && !self.blocks.is_empty() && !self.is_worth_a_sync()
+    }
+
     fn is_worth_a_sync(&self) -> bool {
-        let payloads = self
-            .blocks
-            .iter()
-            .map(|(_, stored)| stored.arrived.payload.len());
-        self.len() >= PIPELINED_MIN || payloads.sum::<usize>() >= PIPELINED_BYTES_MIN
+        self.len() >= PIPELINED_MIN || self.bytes >= PIPELINED_BYTES_MIN
+    }
+
+    fn is_full(&self) -> bool {
+        self.len() >= GROUP_MAX || self.bytes >= GROUP_BYTES_MAX
     }
 }
 
@@ -82,6 +95,7 @@ impl Writer {
         };
         while let Ok(first) = orders.recv().map(take) {
             let mut next = Some(first);
+            let settled_by = Instant::now() + LINGER;
             while let Some(order) = next.filter(|_| !self.is_over) {
                 match order {
                     Order::Block(plan, arrived, era) => {
@@ -90,6 +104,7 @@ impl Writer {
                             era,
                             result: Ok(()),
                         };
+                        group.bytes += stored.arrived.payload.len();
                         group.blocks.push((plan, stored));
                     }
                     Order::Record(entry, ticket) => {
@@ -106,10 +121,14 @@ impl Writer {
                     }
                 }
                 let more = || orders.try_recv().ok().map(take);
-                next = (group.len() < GROUP_MAX).then(more).flatten();
+                next = (!group.is_full()).then(more).flatten();
                 if next.is_none() && !group.is_worth_a_sync() && self.commits.are_ahead() {
                     self.settle_commits();
                     next = more();
+                }
+                if next.is_none() && group.may_linger() {
+                    let left = settled_by.saturating_duration_since(Instant::now());
+                    next = orders.recv_timeout(left).ok().map(take);
                 }
             }
             self.settle(&mut group);
@@ -170,6 +189,7 @@ impl Writer {
             mut blocks,
             records,
             ticket,
+            ..
         } = std::mem::take(group);
         if self.is_over || (blocks.is_empty() && records.is_empty()) {
             return;

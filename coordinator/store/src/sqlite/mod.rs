@@ -14,9 +14,10 @@ mod write;
 use std::error::Error;
 use std::path::{Path, PathBuf};
 
+use model::ImageRef;
 use rusqlite::{Connection, ErrorCode, TransactionBehavior};
 
-use crate::{Entry, Recalled, Store, StoreError};
+use crate::{Entry, Recalled, RecalledBlock, Store, StoreError};
 
 /// A store in a file.
 #[derive(Debug)]
@@ -47,6 +48,19 @@ impl Sqlite {
             what => Err(corrupt(&self.path, what)),
         }
     }
+
+    /// What is kept but for blocks, of which there may be a million: [`Sqlite::recall_blocks`] gives those.
+    pub fn recall_jobs(&mut self) -> Result<Recalled, StoreError> {
+        read::jobs(&self.connection).map_err(|error| explain(&self.path, error))
+    }
+
+    /// The durable blocks, image by image as they are read, in order; those of each image row by row from the top left.
+    pub fn recall_blocks(
+        &mut self,
+        image: impl FnMut(ImageRef, Vec<RecalledBlock>),
+    ) -> Result<(), StoreError> {
+        read::blocks(&self.connection, image).map_err(|error| explain(&self.path, error))
+    }
 }
 
 impl Store for Sqlite {
@@ -62,7 +76,16 @@ impl Store for Sqlite {
     }
 
     fn recall(&mut self) -> Result<Recalled, StoreError> {
-        read::all(&self.connection).map_err(|error| explain(&self.path, error))
+        let mut recalled = self.recall_jobs()?;
+        self.recall_blocks(|image, blocks| {
+            let place = recalled
+                .jobs
+                .binary_search_by_key(&image.job, |job| job.job);
+            let job = place.ok().and_then(|place| recalled.jobs.get_mut(place));
+            job.into_iter()
+                .for_each(|job| job.blocks.extend_from_slice(&blocks));
+        })?;
+        Ok(recalled)
     }
 }
 

@@ -2,18 +2,19 @@
 
 use std::collections::BTreeMap;
 
-use model::{Digest, FrameRange, ImageNumber, JobId, Rect, Revision, Span};
+use model::{Digest, FrameRange, ImageNumber, ImageRef, JobId, Rect, Revision, Span};
 use rusqlite::{Connection, Row};
 use sched::{Needs, Submission};
 
-use super::values::{digest, nonsense, submission, tile_shape, uint};
+use super::values::{digest, int, nonsense, submission, tile_shape, uint};
 use crate::{Recalled, RecalledBlock, RecalledImage, RecalledJob};
 
 type Jobs = BTreeMap<JobId, RecalledJob>;
 
-pub(super) fn all(connection: &Connection) -> rusqlite::Result<Recalled> {
+/// All but blocks.
+pub(super) fn jobs(connection: &Connection) -> rusqlite::Result<Recalled> {
     let last_job = connection.query_row("SELECT last_job FROM farm", [], |row| uint(row, 0))?;
-    let mut jobs = jobs(connection)?;
+    let mut jobs = bare_jobs(connection)?;
     // Each of these tables is read in the order of its key.
     rows(
         connection,
@@ -55,20 +56,44 @@ pub(super) fn all(connection: &Connection) -> rusqlite::Result<Recalled> {
             Ok(())
         },
     )?;
-    rows(
-        connection,
-        "SELECT job, image, x0, y0, x1, y1, elapsed_us, pixels, about
-         FROM blocks ORDER BY job, image, y0, x0, y1, x1",
-        |row| {
-            let block = block(row)?;
-            of(&mut jobs, row)?.blocks.push(block);
-            Ok(())
-        },
-    )?;
     Ok(Recalled {
         last_job: JobId(last_job),
         jobs: jobs.into_values().collect(),
     })
+}
+
+/// The blocks, by image.
+pub(super) fn blocks(
+    connection: &Connection,
+    mut image: impl FnMut(ImageRef, Vec<RecalledBlock>),
+) -> rusqlite::Result<()> {
+    let sql = "SELECT job, image, x0, y0, x1, y1, elapsed_us, pixels, about
+         FROM blocks ORDER BY job, image, y0, x0, y1, x1";
+    let mut is_known = connection.prepare("SELECT 1 FROM jobs WHERE job = ?1")?;
+    let mut together: Option<(ImageRef, Vec<RecalledBlock>)> = None;
+    rows(connection, sql, |row| {
+        let (job, block) = (JobId(uint(row, 0)?), block(row)?);
+        let next = ImageRef {
+            job,
+            image: block.image,
+        };
+        match &mut together {
+            Some((same, blocks)) if *same == next => blocks.push(block),
+            other => {
+                if !is_known.exists([int(job.0)])? {
+                    return Err(nonsense(0, format!("there is no job {job}").into()));
+                }
+                if let Some((last, blocks)) = other.replace((next, vec![block])) {
+                    image(last, blocks);
+                }
+            }
+        }
+        Ok(())
+    })?;
+    if let Some((last, blocks)) = together {
+        image(last, blocks);
+    }
+    Ok(())
 }
 
 fn rows(
@@ -91,7 +116,7 @@ fn of<'a>(jobs: &'a mut Jobs, row: &Row<'_>) -> rusqlite::Result<&'a mut Recalle
     jobs.get_mut(&job).ok_or_else(what)
 }
 
-fn jobs(connection: &Connection) -> rusqlite::Result<Jobs> {
+fn bare_jobs(connection: &Connection) -> rusqlite::Result<Jobs> {
     let mut jobs = Jobs::new();
     let sql = "SELECT job, unix_ms, about, paused, focus_x0, focus_y0, focus_x1, focus_y1,
             cancelled_unix_ms, log_lines,

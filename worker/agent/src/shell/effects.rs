@@ -133,6 +133,9 @@ impl Shell {
     fn start_tile(&mut self, lease: Lease) {
         let attempt = lease.attempt;
         tracing::debug!(job = %lease.image.job, image = %lease.image.image, tile = ?lease.tile, %attempt, "start");
+        if let Some(scene) = self.scenes.at_hand(lease.scene) {
+            return self.pool.render(lease, scene);
+        }
         let scenes = self.scenes.clone();
         let task = load(
             lease,
