@@ -7,11 +7,31 @@ use serde_json::Value;
 
 use crate::engine::{Engine, Kind};
 use crate::flight::Flight;
-use crate::harness::scenes::{FLYBY, busy};
-use crate::harness::{frames, wait};
+use crate::harness::scenes::{FLYBY, Reference};
+use crate::harness::{Place, frames, wait};
 
 /// How long one thread would take; no allocation may run for longer than a minute, the shortest limit of Slurm.
 const WORK: Duration = Duration::from_secs(120);
+
+/// Images of [`FLYBY`] that keep one thread busy for so long by processor time, whatever else the machine does meanwhile.
+fn busy(time: Duration) -> Reference {
+    let place = Place::new();
+    let quick = "--format exr --out quick --resolution 200x150 --rays 1 --frames 0..2 --threads 1";
+    let mut quick = place.start(
+        "quick",
+        ["render", FLYBY].into_iter().chain(quick.split(' ')),
+    );
+    let mut took = Duration::from_millis(10);
+    wait::until("a quick image is there", || {
+        took = took.max(quick.cpu_time());
+        quick.ended()
+    });
+    let mut rays = 1;
+    while took * (rays * rays) < time {
+        rays += 1;
+    }
+    Reference::new(rays)
+}
 
 #[test]
 #[ignore = "long: tests/run --all"]

@@ -28,7 +28,8 @@ pub(crate) struct Reference {
 }
 
 impl Reference {
-    fn new(rays: u32) -> Self {
+    /// With N×N rays a pixel.
+    pub(crate) fn new(rays: u32) -> Self {
         let rays = rays.to_string();
         let settings = [
             "--resolution",
@@ -89,26 +90,6 @@ pub(crate) fn rays_for(time: Duration) -> u32 {
         rays += 1;
     }
     rays
-}
-
-/// [`lasting`] by processor time, whatever else the machine does meanwhile.
-pub(crate) fn busy(time: Duration) -> Reference {
-    let place = Place::new();
-    let quick = "--format exr --out quick --resolution 200x150 --rays 1 --frames 0..2 --threads 1";
-    let mut quick = place.start(
-        "quick",
-        ["render", FLYBY].into_iter().chain(quick.split(' ')),
-    );
-    let mut took = Duration::from_millis(10);
-    wait::until("a quick image is there", || {
-        took = took.max(quick.cpu_time());
-        quick.ended()
-    });
-    let mut rays = 1;
-    while took * (rays * rays) < time {
-        rays += 1;
-    }
-    Reference::new(rays)
 }
 
 /// Renders in one process; answers the frames' film digests, as their files tell them.

@@ -10,7 +10,8 @@ use wire::proto::ErrorKind;
 use wire::tls::token_file::TokenFile;
 use wire::way::Way;
 
-use crate::harness::{Farm, Place, need, raw};
+use crate::harness::scenes::FLYBY;
+use crate::harness::{Farm, Place, need, raw, wait};
 
 /// More than arrive at the same time.
 const SILENT: usize = 400;
@@ -50,6 +51,47 @@ fn callers_that_say_nothing_or_nonsense_cost_nobody_anything() {
     let mut first = silent.first().unwrap();
     let heard = first.read(&mut [0; 16]);
     assert!(matches!(heard, Ok(0) | Err(_)), "{heard:?}");
+    assert!(farm.coordinator.ended().is_none());
+}
+
+#[test]
+fn more_connections_than_there_is_room_for_are_told_so_and_cost_nobody_a_frame() {
+    // 512 files leave room for 64 connections, beside those that are told.
+    let few = ["sh", "-c", "ulimit -n 512 && exec \"$@\"", "--"];
+    let small = [
+        FLYBY,
+        "--resolution",
+        "64x48",
+        "--rays",
+        "1",
+        "--frames",
+        "0..1",
+    ];
+    let mut farm = Farm::wrapped(Place::new(), &few, &[]);
+    farm.worker(&[]);
+    let job = farm.submit(&small);
+    farm.wait_done(job);
+    let connect = || {
+        let mut stream = TcpStream::connect(farm.address).unwrap();
+        // What a client of HTTP/2 says first: it has arrived, and stays.
+        stream
+            .write_all(b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n\0\0\0\x04\0\0\0\0\0")
+            .unwrap();
+        stream
+    };
+    let mut open: Vec<_> = (0..60).map(|_| connect()).collect();
+    // The worker and 60 others: by and by all places are taken.
+    wait::until("somebody is told that there is no room", || {
+        open.push(connect());
+        let asked = farm.flyby(["job", "list"]);
+        (!asked.status.success()).then(|| asked.refused(3, &["as many connections", "ulimit -n"]))
+    });
+    drop(open);
+    wait::until("there is room again", || {
+        farm.flyby(["job", "list"]).status.success().then_some(())
+    });
+    let job = farm.submit(&small);
+    farm.wait_done(job);
     assert!(farm.coordinator.ended().is_none());
 }
 

@@ -26,12 +26,13 @@ use wire::tls::{ALPN, VERSIONS, provider};
 
 use super::anytime::Anytime;
 use super::authority::Authority;
+use super::room::{Place, Room};
 
 /// How long a caller may take until it has been heard out: its first byte, and all of TLS.
 const ARRIVAL_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Most callers that arrive at the same time on one address.
-const ARRIVING_MAX: usize = 256;
+pub(super) const ARRIVING_MAX: usize = 256;
 
 /// Callers that have arrived and wait to be served.
 const ARRIVED_MAX: usize = 64;
@@ -56,6 +57,8 @@ pub(crate) enum Line {
     Loopback,
     /// In the clear, from elsewhere.
     Open,
+    /// Whatever it is, there is no room for it.
+    Over,
     /// TLS; with the certificate that was shown and is this authority's, if one was.
     Tls(Option<Arc<Claims>>),
 }
@@ -64,6 +67,8 @@ pub(crate) enum Line {
 pub(crate) struct Connection {
     io: Io,
     caller: Caller,
+    /// Held while the connection is open.
+    _place: Place,
 }
 
 enum Io {
@@ -78,8 +83,9 @@ pub(crate) fn accept(
 ) -> Result<ReceiverStream<io::Result<Connection>>, rustls::Error> {
     let tls = TlsAcceptor::from(Arc::new(config(authority)?));
     let (arrived, connections) = mpsc::channel(ARRIVED_MAX);
+    let room = Room::of_process();
     for listener in listeners {
-        tokio::spawn(listen(listener, tls.clone(), arrived.clone()));
+        tokio::spawn(listen(listener, tls.clone(), room.clone(), arrived.clone()));
     }
     Ok(connections.into())
 }
@@ -102,6 +108,7 @@ fn config(authority: &Arc<Authority>) -> Result<ServerConfig, rustls::Error> {
 async fn listen(
     listener: TcpListener,
     tls: TlsAcceptor,
+    room: Room,
     arrived: mpsc::Sender<io::Result<Connection>>,
 ) {
     let mut arriving = JoinSet::new();
@@ -127,9 +134,10 @@ async fn listen(
             tracing::debug!("too many callers arrive at once: the oldest is dropped");
             oldest.abort();
         }
-        let (tls, arrived) = (tls.clone(), arrived.clone());
+        let (tls, room, arrived) = (tls.clone(), room.clone(), arrived.clone());
         oldest_first.push_back(arriving.spawn(async move {
-            let arrival = tokio::time::timeout(ARRIVAL_TIMEOUT, arrive(stream, peer, tls)).await;
+            let arrival = arrive(stream, peer, tls, &room);
+            let arrival = tokio::time::timeout(ARRIVAL_TIMEOUT, arrival).await;
             match arrival {
                 Ok(Ok(connection)) => {
                     // Nobody serves any more.
@@ -142,37 +150,44 @@ async fn listen(
     }
 }
 
-async fn arrive(stream: TcpStream, peer: SocketAddr, tls: TlsAcceptor) -> io::Result<Connection> {
+async fn arrive(
+    stream: TcpStream,
+    peer: SocketAddr,
+    tls: TlsAcceptor,
+    room: &Room,
+) -> io::Result<Connection> {
     stream.set_nodelay(true)?;
     let mut first = [0];
     if stream.peek(&mut first).await? == 0 {
         return Err(io::ErrorKind::UnexpectedEof.into());
     }
-    if first[0] != HANDSHAKE {
-        let line = match peer.ip().to_canonical().is_loopback() {
-            true => Line::Loopback,
-            false => Line::Open,
+    let (io, line) = if first[0] == HANDSHAKE {
+        let stream = tls.accept(stream).await?;
+        let shown = stream.get_ref().1.peer_certificates();
+        let claims = match shown.and_then(<[_]>::first) {
+            None => None,
+            Some(certificate) => {
+                let claims = Claims::read(certificate);
+                Some(Arc::new(claims.ok_or(io::ErrorKind::InvalidData)?))
+            }
         };
-        return Ok(Connection {
-            io: Io::Plain(stream),
-            caller: Caller { peer, line },
-        });
-    }
-    let stream = tls.accept(stream).await?;
-    let shown = stream.get_ref().1.peer_certificates();
-    let claims = match shown.and_then(<[_]>::first) {
-        None => None,
-        Some(certificate) => {
-            let claims = Claims::read(certificate);
-            Some(Arc::new(claims.ok_or(io::ErrorKind::InvalidData)?))
-        }
+        (Io::Tls(Box::new(stream)), Line::Tls(claims))
+    } else if peer.ip().to_canonical().is_loopback() {
+        (Io::Plain(stream), Line::Loopback)
+    } else {
+        (Io::Plain(stream), Line::Open)
+    };
+    let Some(place) = room.place() else {
+        return Err(io::Error::other("too many connections are open"));
+    };
+    let line = match place.is_over {
+        true => Line::Over,
+        false => line,
     };
     Ok(Connection {
-        io: Io::Tls(Box::new(stream)),
-        caller: Caller {
-            peer,
-            line: Line::Tls(claims),
-        },
+        io,
+        caller: Caller { peer, line },
+        _place: place,
     })
 }
 

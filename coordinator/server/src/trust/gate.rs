@@ -117,6 +117,12 @@ impl Trust {
                     "this coordinator speaks TLS with other machines, and what came was in the clear: make a token where it runs (`flyby token create`), and give its file with `--token-file`",
                 ));
             }
+            Line::Over => {
+                return Err(Failure::later(
+                    ErrorKind::NotReady,
+                    "the coordinator has as many connections open as it may: try again later, or let its process have more open files (`ulimit -n`; LimitNOFILE of its unit)",
+                ));
+            }
             Line::Loopback => None,
             Line::Tls(shown) => shown.as_deref(),
         };

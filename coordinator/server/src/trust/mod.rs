@@ -17,6 +17,7 @@ mod anytime;
 pub(crate) mod authority;
 pub(crate) mod gate;
 pub(crate) mod role;
+mod room;
 pub(crate) mod tokens;
 
 use std::sync::Arc;
