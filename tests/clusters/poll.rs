@@ -4,8 +4,9 @@ use std::time::Duration;
 
 use crate::engine::{Engine, Kind};
 use crate::flight::{Flight, renders_the_same};
-use crate::harness::scenes::{FLYBY, lasting, slow, small};
+use crate::harness::scenes::{FLYBY, slow, small};
 use crate::harness::{Place, wait};
+use crate::timelimit::busy;
 
 /// A farm whose site is this machine, with two tasks at a time.
 fn here(more: &str) -> Flight {
@@ -128,7 +129,7 @@ fn a_lockout_is_no_lockout() {
     let Some(engine) = Engine::gridengine(1, &[("GE_DEFAULT_H_RT", "0:0:5")]) else {
         return;
     };
-    let long = lasting(Duration::from_secs(40));
+    let long = busy(Duration::from_secs(40));
     let more = "mode = 'poll'\nmin_tile_pixels = 30000\nmax_running = 1";
     let flight = Flight::new(&engine, Kind::GridEngine, more);
     let job = flight.farm.submit(&long.with(&[FLYBY]));

@@ -262,7 +262,10 @@ fn what_a_queue_renders_out_of_reach_counts_when_it_is_back_within_its_patience(
             (theirs[0].attempt, 0),
             theirs[0].tile.blocks().next().unwrap(),
         );
-        farm.waits_with_heartbeats(Span::from_secs(away), LOCAL, &[]);
+        farm.is_told(Event::Goodbye {
+            worker: worker(LOCAL),
+        });
+        farm.waits(Span::from_secs(away));
         let was_lost = |effect: &Effect| *effect == forget(SITE);
         assert_eq!(farm.never_mind().iter().any(was_lost), !counts);
         farm.is_told(Event::WorkerJoined {
@@ -276,12 +279,13 @@ fn what_a_queue_renders_out_of_reach_counts_when_it_is_back_within_its_patience(
             held,
             begun: vec![],
         });
-        let last = ours.last().unwrap();
-        let missing = farm.sched.missing(worker(SITE), last.attempt);
+        // What it had begun, which nobody else has.
+        let kept = &ours[0];
+        let missing = farm.sched.missing(worker(SITE), kept.attempt);
         assert_eq!(missing.is_some(), counts);
         let before = farm.sched.image(image_ref(0)).unwrap().pixels_done;
         for rect in missing.unwrap_or_default() {
-            store(&mut farm, SITE, (last.attempt, 0), rect);
+            store(&mut farm, SITE, (kept.attempt, 0), rect);
         }
         let more = farm.sched.image(image_ref(0)).unwrap().pixels_done - before;
         assert_eq!(more > 0, counts);

@@ -41,7 +41,7 @@ impl Times {
     pub(super) fn too_short(&self, dearest: Span) -> Option<String> {
         let seconds = |span: Span| span.0.div_ceil(1_000_000);
         let limit = self.limit(dearest, DOUBLED_MAX)?;
-        let is_short = dearest > Span(0) && limit < needed(dearest);
+        let is_short = limit < dearest.times(FACTOR);
         is_short.then(|| {
             let next = match self.asked {
                 Some(asked) if self.most.is_none_or(|most| asked < most) => {
@@ -115,10 +115,10 @@ mod tests {
             usual: Some(minutes(5)),
             ..times
         };
-        assert_eq!(queue.too_short(minutes(29)), None);
+        assert_eq!(queue.too_short(minutes(30)), None);
         assert!(
             queue
-                .too_short(minutes(30))
+                .too_short(minutes(31))
                 .unwrap()
                 .contains("another `queue`")
         );
