@@ -164,7 +164,8 @@ struct Room {
     blocks: u32,
 }
 
-/// Sends the whole blocks of a task's file beyond an offset but for some, as far as there is room.
+/// Sends the whole blocks of a task's file beyond an offset, as far as there is room. Of those that are not wanted only where they
+/// end is said: however many there are, whoever asks comes past them.
 fn send(
     path: &Path,
     (offset, but): (u64, &[[u32; 4]]),
@@ -191,13 +192,14 @@ fn send(
         let (entry, after) = rest.split_at(length);
         at += length as u64;
         rest = after;
-        if is_one_of(entry, but) {
-            continue;
-        }
-        let head = Frame::head(array, task, at, u32::try_from(length).unwrap_or(u32::MAX));
-        out.write_all(&head)?;
+        let entry = match is_one_of(entry, but) {
+            true => &[],
+            false => entry,
+        };
+        let sent = u32::try_from(entry.len()).unwrap_or(u32::MAX);
+        out.write_all(&Frame::head(array, task, at, sent))?;
         out.write_all(entry)?;
-        room.bytes -= length as u64;
+        room.bytes -= entry.len() as u64;
         room.blocks -= 1;
     }
     // What was read ends where the room did.
@@ -218,4 +220,72 @@ fn is_one_of(entry: &[u8], blocks: &[[u32; 4]]) -> bool {
     };
     let record = BlockRecord::only(&delivery.record);
     record.is_ok_and(|record| blocks.contains(&edges(record.header.rect)))
+}
+
+#[cfg(test)]
+mod tests {
+    use model::{AttemptId, Epoch, ImageNumber, ImageRef, JobId, Rect};
+    use wire::BlockHeader;
+    use wire::proto::Delivery;
+
+    use super::*;
+
+    fn rect(number: u32) -> Rect {
+        Rect {
+            x0: number,
+            y0: 0,
+            x1: number + 1,
+            y1: 1,
+        }
+    }
+
+    fn entry(number: u32) -> Vec<u8> {
+        let header = BlockHeader {
+            image: ImageRef {
+                job: JobId(1),
+                image: ImageNumber(2),
+            },
+            rect: rect(number),
+            attempt: AttemptId {
+                epoch: Epoch(3),
+                number: 4,
+            },
+        };
+        spool::entry(&Delivery {
+            record: header.record(&[1; 32]).unwrap().into(),
+            render_us: 17,
+            counters: Vec::new(),
+        })
+    }
+
+    #[test]
+    fn whoever_asks_comes_past_more_than_one_answer_holds_of_what_is_not_wanted() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("1.blocks");
+        let entries: Vec<_> = (0..5).map(entry).collect();
+        fs::write(&path, entries.concat()).unwrap();
+        let but: Vec<_> = (0..4).map(|number| edges(rect(number))).collect();
+        // Room for two blocks at a time, of which the first four are not wanted.
+        let bytes = 2 * entries[0].len() as u64 + 10;
+        let (mut offset, mut brought, mut asked) = (0, Vec::new(), 0);
+        loop {
+            let mut room = Room { bytes, blocks: 100 };
+            let mut out = Vec::new();
+            let end = send(&path, (offset, &but), (0, 1), &mut room, &mut out).unwrap();
+            let mut rest = &out[..];
+            while let Some((frame, after)) = Frame::read(rest) {
+                rest = after;
+                assert!(frame.end > offset, "it goes on");
+                offset = frame.end;
+                brought.extend_from_slice(frame.entry);
+            }
+            asked += 1;
+            assert!(asked < 10, "it ends");
+            if end == End::Whole {
+                break;
+            }
+        }
+        assert_eq!(brought, entries[4]);
+        assert_eq!(offset, entries.concat().len() as u64);
+    }
 }

@@ -269,7 +269,7 @@ pub struct Frame<'a> {
     pub task: u32,
     /// Where its entry ends in the task's file.
     pub end: u64,
-    /// The entry.
+    /// The entry; nothing where its block is not wanted.
     pub entry: &'a [u8],
 }
 

@@ -279,7 +279,7 @@ fn what_a_queue_renders_out_of_reach_counts_when_it_is_back_within_its_patience(
             held,
             begun: vec![],
         });
-        // What it had begun, which nobody else has.
+        // What it had begun, of which whoever was here meanwhile has left the rest.
         let kept = &ours[0];
         let missing = farm.sched.missing(worker(SITE), kept.attempt);
         assert_eq!(missing.is_some(), counts);

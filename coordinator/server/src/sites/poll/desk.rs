@@ -36,9 +36,9 @@ pub(super) struct Fetched {
     pub(super) task: u32,
     /// Where it ends in the file.
     pub(super) end: u64,
-    /// How many bytes it has.
+    /// How many bytes it has; none where it was not wanted.
     pub(super) bytes: u64,
-    /// The block; `None` where it was damaged.
+    /// The block; `None` where it was damaged or not wanted.
     pub(super) delivery: Option<Delivery>,
 }
 

@@ -347,9 +347,15 @@ impl<'a> Poller<'a> {
                     }
                 }
             }
-            let bytes: u64 = blocks.iter().map(|block| block.bytes).sum();
+            let brought = || {
+                blocks
+                    .iter()
+                    .map(|block| block.bytes)
+                    .filter(|&bytes| bytes > 0)
+            };
+            let (count, bytes) = (brought().count() as u64, brought().sum::<u64>());
             self.errand.board.change(self.name(), |site| {
-                site.fetched_blocks += blocks.len() as u64;
+                site.fetched_blocks += count;
                 site.fetched_bytes += bytes;
                 site.fetched_again += again;
             });
@@ -422,6 +428,10 @@ impl<'a> Poller<'a> {
                     self.poll.refused(now, name, words);
                     // Its limits may be others than they were.
                     if let Ok(limits) = self.errand.camp.queue.limits() {
+                        let site = &self.errand.camp.site;
+                        self.errand
+                            .board
+                            .has_slots(&site.name, slots(site, &limits));
                         self.poll.settle(settings(self.errand, &limits));
                         self.limits = limits;
                     }
