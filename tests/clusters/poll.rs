@@ -4,13 +4,14 @@ use std::time::Duration;
 
 use crate::engine::{Engine, Kind};
 use crate::flight::{Flight, renders_the_same};
-use crate::harness::scenes::{FLYBY, slow, small};
+use crate::harness::scenes::{FLYBY, lasting, slow, small};
 use crate::harness::{Place, wait};
 use crate::timelimit::busy;
 
 /// A farm whose site is this machine, with two tasks at a time.
-fn here(more: &str) -> Flight {
-    let more = format!("mode = 'poll'\nmax_running = 2\nmin_tile_pixels = 5000\n{more}");
+fn here(min_tile_pixels: u32, more: &str) -> Flight {
+    let more =
+        format!("mode = 'poll'\nmax_running = 2\nmin_tile_pixels = {min_tile_pixels}\n{more}");
     Flight::at("kind = 'local'\n", env!("CARGO_BIN_EXE_flyby"), &more)
 }
 
@@ -27,7 +28,7 @@ fn tidies_up(flight: &Flight) {
 
 #[test]
 fn this_machine_polled_gives_the_frames_of_one_process() {
-    let flight = here("");
+    let flight = here(5_000, "");
     let job = flight.farm.submit(&small().with(&[FLYBY]));
     let done = flight.farm.wait_done(job);
     assert_eq!(done.film_digests(), small().digests);
@@ -40,14 +41,19 @@ fn this_machine_polled_gives_the_frames_of_one_process() {
 #[test]
 #[ignore = "long: tests/run --all"]
 fn a_coordinator_that_was_killed_takes_up_what_runs_there() {
-    let mut flight = here("");
-    let job = flight.farm.submit(&slow().with(&[FLYBY]));
-    flight.farm.wait_acknowledged(job, 1);
+    // An image is one tile, of which some blocks are here and some are not.
+    let work = lasting(Duration::from_secs(20));
+    let mut flight = here(30_000, "");
+    let job = flight.farm.submit(&work.with(&[FLYBY]));
+    let before = flight.farm.wait_acknowledged(job, 1);
     flight.farm.coordinator.kill();
     flight.farm.start_again();
     let done = flight.farm.wait_done(job);
-    assert_eq!(done.film_digests(), slow().digests);
+    assert_eq!(done.film_digests(), work.digests);
     assert_eq!(done.number("blocks_again"), 0, "{done:?}");
+    // What was durable is not fetched once more.
+    let left = done.number("blocks_done") - before.number("blocks_done");
+    assert!(flight.count("fetched_blocks") <= left, "{}", flight.site());
     tidies_up(&flight);
 
     // One that does not come back leaves what can be removed.
@@ -84,7 +90,7 @@ fn a_site_that_does_not_answer_leaves_its_tiles_to_others_and_comes_back() {
 #[test]
 #[ignore = "long: tests/run --all"]
 fn a_job_that_is_cancelled_leaves_no_array() {
-    let flight = here("");
+    let flight = here(5_000, "");
     let job = flight.farm.submit(&slow().with(&[FLYBY]));
     flight.farm.wait_acknowledged(job, 1);
     flight.farm.flyby(["job", "cancel", &job.to_string()]).ok();
