@@ -166,7 +166,7 @@ impl Drop for Desk {
     }
 }
 
-/// The blocks of an answer, with the offsets after them, and how it ends.
+/// The blocks of an answer, with the offsets after them, and how it ends. Those that were not wanted are left out.
 fn frames(mut bytes: &[u8]) -> (Vec<(u32, u64, Rect)>, End) {
     let mut blocks = Vec::new();
     loop {
@@ -175,6 +175,9 @@ fn frames(mut bytes: &[u8]) -> (Vec<(u32, u64, Rect)>, End) {
         if let Some(end) = frame.end() {
             assert!(rest.is_empty());
             return (blocks, end);
+        }
+        if frame.entry.is_empty() {
+            continue;
         }
         let Entry::Block(delivery, _) = spool::read(frame.entry) else {
             panic!("a damaged block");

@@ -6,7 +6,6 @@ use crate::engine::{Engine, Kind};
 use crate::flight::{Flight, renders_the_same};
 use crate::harness::scenes::{FLYBY, lasting, slow, small};
 use crate::harness::{Place, wait};
-use crate::timelimit::busy;
 
 /// A farm whose site is this machine, with two tasks at a time.
 fn here(min_tile_pixels: u32, more: &str) -> Flight {
@@ -135,7 +134,7 @@ fn a_lockout_is_no_lockout() {
     let Some(engine) = Engine::gridengine(1, &[("GE_DEFAULT_H_RT", "0:0:5")]) else {
         return;
     };
-    let long = busy(Duration::from_secs(40));
+    let long = lasting(Duration::from_secs(40));
     let more = "mode = 'poll'\nmin_tile_pixels = 30000\nmax_running = 1";
     let flight = Flight::new(&engine, Kind::GridEngine, more);
     let job = flight.farm.submit(&long.with(&[FLYBY]));

@@ -19,7 +19,7 @@ const IMAGES: usize = 5;
 const TILES: usize = 12;
 
 /// How long one thread would take over two images: a task takes more than a look, and an image several.
-const TWO_IMAGES: Duration = Duration::from_secs(50);
+const TWO_IMAGES: Duration = Duration::from_secs(20);
 
 /// A task by the queue's accounts, in seconds since 1970.
 #[derive(Clone, Copy, Debug)]

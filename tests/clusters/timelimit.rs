@@ -7,34 +7,11 @@ use serde_json::Value;
 
 use crate::engine::{Engine, Kind};
 use crate::flight::Flight;
-use crate::harness::scenes::{FLYBY, Reference};
-use crate::harness::{Place, frames, wait};
+use crate::harness::scenes::{FLYBY, lasting};
+use crate::harness::{frames, wait};
 
 /// How long one thread would take; no allocation may run for longer than a minute, the shortest limit of Slurm.
 const WORK: Duration = Duration::from_secs(120);
-
-/// N of the N×N rays with which it is tried how long images take: enough that what is done once weighs little.
-const TRIED: u32 = 8;
-
-/// Images of [`FLYBY`] that keep one thread busy for so long by processor time, whatever else the machine does meanwhile.
-pub(crate) fn busy(time: Duration) -> Reference {
-    let place = Place::new();
-    let tried = format!(
-        "--format exr --out tried --resolution 200x150 --rays {TRIED} --frames 0..2 --threads 1"
-    );
-    let tried = ["render", FLYBY].into_iter().chain(tried.split(' '));
-    let mut tried = place.start("tried", tried);
-    let mut took = Duration::ZERO;
-    wait::until_within(wait::LONG_LIMIT, "images that are tried are there", || {
-        took = took.max(tried.cpu_time());
-        tried.ended()
-    });
-    let mut rays = TRIED;
-    while took * (rays * rays) < time * (TRIED * TRIED) {
-        rays += 1;
-    }
-    Reference::new(rays)
-}
 
 #[test]
 #[ignore = "long: tests/run --all"]
@@ -42,7 +19,7 @@ fn a_job_is_done_through_allocations_of_a_minute() {
     let Some(engine) = Engine::slurm(1) else {
         return;
     };
-    let work = busy(WORK);
+    let work = lasting(WORK);
     let more = "max_running = 1\nahead = 0\ntime_limit = '1 min'\nidle = '5 s'";
     let flight = Flight::new(&engine, Kind::Slurm, more);
     // Each image is one tile, for which no allocation has time enough.

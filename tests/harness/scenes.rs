@@ -2,7 +2,7 @@
 
 use std::path::Path;
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::{Place, frames, wait};
 
@@ -16,7 +16,10 @@ pub(crate) const TINY: [&str; 4] = ["--resolution", "80x60", "--rays", "1"];
 pub(crate) const ENDLESS: [&str; 5] = [FLYBY, "--resolution", "200x150", "--rays", "4"];
 
 /// How long one thread shall take over [`slow`]'s images: long enough that something can happen meanwhile.
-const SLOW: Duration = Duration::from_secs(4);
+const SLOW: Duration = Duration::from_secs(3);
+
+/// N of the N×N rays with which it is tried how long images take: enough that what is done once weighs little.
+const TRIED: u32 = 4;
 
 /// Images 0 and 1 of [`FLYBY`] at some settings, as one process rendered them.
 pub(crate) struct Reference {
@@ -71,22 +74,22 @@ pub(crate) fn lasting(time: Duration) -> Reference {
     Reference::new(rays_for(time))
 }
 
-/// N of the N×N rays with which images 0 and 1 of [`FLYBY`], 200×150 pixels each, keep one thread busy for so long.
+/// N of the N×N rays with which images 0 and 1 of [`FLYBY`], 200×150 pixels each, keep one thread busy for so long by
+/// processor time, whatever else the machine does meanwhile.
 pub(crate) fn rays_for(time: Duration) -> u32 {
-    let start = Instant::now();
-    let quick = [
-        "--resolution",
-        "200x150",
-        "--rays",
-        "1",
-        "--frames",
-        "0..2",
-        "--threads",
-        "1",
-    ];
-    rendered(&Place::new(), "quick", &quick);
-    let (mut rays, took) = (1, start.elapsed());
-    while took * (rays * rays) < time {
+    let place = Place::new();
+    let tried = format!(
+        "--format exr --out tried --resolution 200x150 --rays {TRIED} --frames 0..2 --threads 1"
+    );
+    let tried = ["render", FLYBY].into_iter().chain(tried.split(' '));
+    let mut tried = place.start("tried", tried);
+    let mut took = Duration::from_millis(10);
+    wait::until_within(wait::LONG_LIMIT, "images that are tried are there", || {
+        took = took.max(tried.cpu_time());
+        tried.ended()
+    });
+    let mut rays = 1;
+    while took * (rays * rays) < time * (TRIED * TRIED) {
         rays += 1;
     }
     rays
