@@ -10,6 +10,9 @@ const CELLS: f64 = 4.0;
 /// Cells to the left of the first and above it: filters reach beyond their pixels.
 const BEFORE: f64 = 1024.0;
 
+/// Bits that tell samples apart, beside 16 of the slice and 32 of the curve.
+const INDEX_BITS: u32 = 16;
+
 /// Puts samples in order and tells from which place each one comes.
 ///
 /// They are sorted by one of `slices` equal parts of the shutter, then along a Morton curve over
@@ -20,19 +23,25 @@ pub(crate) fn arrange(
     slices: u32,
     from: &mut Vec<u32>,
 ) {
+    assert!(samples.len() <= 1 << INDEX_BITS);
     let corner = corner.map(|part| f64::from(part) - BEFORE / CELLS);
-    let mut keys: Vec<(u64, u32)> = (0u32..)
+    // One number for each: its slice, its place along the curve, where it stood.
+    let mut keys: Vec<u64> = (0u64..)
         .zip(samples.iter())
         .map(|(index, sample)| {
             let [x, y] = [0, 1].map(|axis| whole((sample.place[axis] - corner[axis]) * CELLS));
             let slice = whole(sample.instant * f64::from(slices));
             let curve = u64::from(spread(x) | spread(y) << 1);
-            (u64::from(slice) << 32 | curve, index)
+            (u64::from(slice) << 32 | curve) << INDEX_BITS | index
         })
         .collect();
     keys.sort_unstable();
     from.clear();
-    from.extend(keys.iter().map(|&(_, index)| index));
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "the low bits alone are wanted"
+    )]
+    from.extend(keys.iter().map(|key| *key as u32 & ((1 << INDEX_BITS) - 1)));
     *samples = from.iter().map(|&index| samples[index as usize]).collect();
 }
 

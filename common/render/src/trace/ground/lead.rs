@@ -16,7 +16,7 @@ const LANES: usize = 64;
 const NUDGE: f64 = 1e-4;
 
 /// How many times as large as the finest cells at a place the coarsest are that are tried there.
-const DEPTH: f64 = 128.0;
+const DEPTH: f64 = 1024.0;
 
 /// One over the cells along a block's side; a power of two.
 const PER_SIDE: f64 = 1.0 / SIDE as f64;
