@@ -101,6 +101,9 @@ impl Check {
                 None
             }
         };
+        if let Some(Err(error)) = &seen.room {
+            findings.push(trouble("disk", error));
+        }
         let mut queue = None;
         let mut limits = None;
         match seen.queue {

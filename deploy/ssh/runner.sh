@@ -14,7 +14,8 @@ note() {
 
 # A signal is for the task that runs: this one stays to write down how it ended.
 trap : HUP INT TERM
-note "$$.runner" "$$"
+# Who cannot be found by that must not run.
+note "$$.runner" "$$" || exit 1
 read -r count <count
 task=0
 while [ "$task" -lt "$count" ]; do

@@ -30,6 +30,11 @@ impl Flight {
         Self::on(Ipv4Addr::LOCALHOST, site, program, more)
     }
 
+    /// The same, in this place.
+    pub(crate) fn in_place(place: Place, site: &str, program: &str, more: &str) -> Self {
+        Self::start(place, Ipv4Addr::LOCALHOST, (site, program, more))
+    }
+
     /// A coordinator on an address that the hosts of an engine dial, so that they join over TLS.
     pub(crate) fn over_tls(engine: &Engine, kind: Kind, more: &str) -> Self {
         let program = env!("CARGO_BIN_EXE_flyby");
@@ -37,7 +42,10 @@ impl Flight {
     }
 
     fn on(listens: Ipv4Addr, site: &str, program: &str, more: &str) -> Self {
-        let place = Place::new();
+        Self::start(Place::new(), listens, (site, program, more))
+    }
+
+    fn start(place: Place, listens: Ipv4Addr, (site, program, more): (&str, &str, &str)) -> Self {
         let there = place.path("there");
         let text = format!(
             "[site.test]\n{site}folder = '{}'\nprogram = '{program}'\npoll = '1 s'\n{more}\n",

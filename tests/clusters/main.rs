@@ -19,6 +19,7 @@ mod backends;
 mod commands;
 mod engine;
 mod flight;
+mod full_folder;
 mod gridengine;
 mod orphans;
 mod pilot;

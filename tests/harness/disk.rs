@@ -1,18 +1,18 @@
-//! A small disk for a state folder, which can be filled.
+//! A small disk for a folder, which can be filled.
 
 use std::fs::{self, OpenOptions};
 use std::io::{ErrorKind, Write as _};
 use std::os::unix::fs::symlink;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use super::{Place, Process, need, wait};
 
-/// The state folder of a place on a file system of its own, in memory.
+/// A folder of a place on a file system of its own, in memory.
 ///
 /// A process holds it mounted where nobody else sees it, so that it outlives every coordinator and
 /// goes with the test. Coordinators enter by [`SmallDisk::wrapper`]; for everybody else
-/// [`Place::state`] is a link through `/proc`.
+/// the folder is a link through `/proc`.
 pub(crate) struct SmallDisk {
     filler: PathBuf,
     wrapper: Vec<String>,
@@ -20,9 +20,9 @@ pub(crate) struct SmallDisk {
 }
 
 impl SmallDisk {
-    /// Mounts one of so much room; `None`, and said by name, where this user may not.
+    /// Mounts one of so much room in a folder's place; `None`, and said by name, where this user may not.
     #[must_use]
-    pub(crate) fn mount(place: &Place, size: &str) -> Option<Self> {
+    pub(crate) fn mount(place: &Place, folder: &Path, size: &str) -> Option<Self> {
         const MOUNT: &str =
             "mount -t tmpfs -o size=\"$1\" flyby-test \"$2\" && echo mounted && exec cat";
         let way = need::mounting()?;
@@ -43,7 +43,7 @@ impl SmallDisk {
         });
         let holder_id = holder.id().to_string();
         let inside = PathBuf::from(format!("/proc/{holder_id}/root{}", disk.display()));
-        symlink(&inside, place.state()).unwrap();
+        symlink(&inside, folder).unwrap();
         let mut wrapper = vec!["nsenter", "--target", &holder_id, "--mount"];
         if way.contains(&"--map-root-user") {
             wrapper.extend(["--user", "--preserve-credentials"]);
@@ -56,7 +56,7 @@ impl SmallDisk {
         })
     }
 
-    /// The start of a command that sees the disk at [`Place::state`] and wherever that leads.
+    /// The start of a command that sees the disk in the folder's place and wherever that leads.
     pub(crate) fn wrapper(&self) -> Vec<&str> {
         self.wrapper.iter().map(String::as_str).collect()
     }

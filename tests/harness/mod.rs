@@ -5,7 +5,7 @@
 //! - [`Process`]: one running process; killed, with all it started, when it is dropped.
 //! - [`Farm`]: a coordinator, its workers and its jobs.
 //! - [`Proxy`]: a link between a worker and its coordinator that can be cut and frozen.
-//! - [`SmallDisk`]: a state folder on a disk of its own, which can be filled.
+//! - [`SmallDisk`]: a folder on a disk of its own, which can be filled.
 //! - [`frames`]: frames as files, to be compared byte for byte.
 //! - [`raw`]: a client that says to a coordinator what no worker of ours would say.
 //! - [`wait`]: waiting for conditions; nothing here sleeps for a time and hopes.

@@ -11,7 +11,7 @@ use cluster::orders::{
     End, FETCH_BLOCKS_MAX, FETCH_BYTES_MAX, Frame, Look, Seen, SeenArray, SeenTask, Stands, Wants,
     edges,
 };
-use cluster::{Task, TaskState};
+use cluster::{Camp, ClusterError, Task, TaskState};
 use wire::block::BlockRecord;
 use wire::spool::{self, Entry};
 
@@ -35,7 +35,7 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
     // What the queue has of ours that has no folder is nobody's.
     for (name, tasks) in &shown {
         let is_there = arrays.iter().any(|array| array.name == *name);
-        let is_live = tasks.values().any(|&stands| stands != Stands::Ended);
+        let is_live = tasks.values().any(|stands| stands.is_live());
         if !is_there && is_live {
             arrays.push(SeenArray {
                 name: name.clone(),
@@ -48,9 +48,18 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
     let seen = Seen {
         arrays,
         files: names(&folder.scenes())?,
+        full: full(&camp),
     };
     answer(folder, &seen, &request.wants)
         .map_err(|error| Error::failed("cannot answer").because(error))
+}
+
+/// What is said to whoever would write more; nothing where there is room. Other trouble tells by itself what it is.
+fn full(camp: &Camp) -> Option<String> {
+    match camp.has_room() {
+        Err(ClusterError::Full { said, .. }) => Some(said),
+        _ => None,
+    }
 }
 
 fn by_array(tasks: Vec<Task>) -> BTreeMap<String, Shown> {
@@ -88,14 +97,18 @@ fn array(
     let nothing = Shown::new();
     let mut tasks = numbered(shown.unwrap_or(&nothing), count);
     let place = folder.array(name)?;
-    for file in entries(&place)? {
-        let number = file.0.strip_suffix(".blocks").map(str::parse::<usize>);
-        let task = match number {
-            Some(Ok(number @ 1..)) => tasks.get_mut(number - 1),
+    for (file, length) in entries(&place)? {
+        let Some((number, kind)) = file.split_once('.') else {
+            continue;
+        };
+        let task = match number.parse::<usize>() {
+            Ok(number @ 1..) => tasks.get_mut(number - 1),
             _ => None,
         };
-        if let Some(task) = task {
-            task.1 = file.1;
+        match (task, kind) {
+            (Some(task), "blocks") => task.1 = length,
+            (Some(task), "full") if !task.0.is_live() => task.0 = Stands::Full,
+            _ => {}
         }
     }
     let order = order.filter(|_| !known.contains(name));

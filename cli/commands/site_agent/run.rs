@@ -3,7 +3,7 @@
 
 use std::collections::BTreeSet;
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{Read as _, Write as _};
+use std::io::{self, ErrorKind, Read as _, Write as _};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -45,7 +45,8 @@ pub(super) fn run(folder: &Folder, array: &str, task: u32) -> Result<(), Error> 
         ))
         .next("bring the coordinator's program here: `flyby site install SITE`"));
     }
-    let (file, have) = open(&folder.blocks(array, task)?)?;
+    let path = folder.blocks(array, task)?;
+    let (file, have) = open(&path)?;
     let wanted: Vec<Rect> = lease
         .blocks()
         .filter(|block| !have.contains(block))
@@ -62,6 +63,7 @@ pub(super) fn run(folder: &Folder, array: &str, task: u32) -> Result<(), Error> 
         image: &*image,
         wanted: &wanted,
         next: AtomicUsize::new(0),
+        path: &path,
         file: Mutex::new(file),
         until: until(&order, begun),
         failed: AtomicBool::new(false),
@@ -98,6 +100,7 @@ struct Work<'a> {
     image: &'a dyn OpenImage,
     wanted: &'a [Rect],
     next: AtomicUsize,
+    path: &'a Path,
     file: Mutex<File>,
     until: Option<Instant>,
     failed: AtomicBool,
@@ -145,13 +148,14 @@ impl Work<'_> {
             });
             if let Err(error) = self.write(&entry) {
                 self.failed.store(true, Ordering::Relaxed);
+                note_full(self.path, &error);
                 return Err(Error::failed("cannot write a finished block").because(error));
             }
         }
     }
 
     /// Writes an entry at the end of the file, durably, or leaves the file as it was.
-    fn write(&self, entry: &[u8]) -> std::io::Result<()> {
+    fn write(&self, entry: &[u8]) -> io::Result<()> {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let before = file.metadata()?.len();
         let written = file.write_all(entry).and_then(|()| file.sync_data());
@@ -162,12 +166,26 @@ impl Work<'_> {
     }
 }
 
+/// Notes by an empty file, for which there may be room, that a task came to nothing for lack of it.
+fn note_full(path: &Path, error: &io::Error) {
+    if matches!(
+        error.kind(),
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded
+    ) {
+        // Without it the task counts as one that failed, unless the folder is still full when it is looked at.
+        let _ = File::create(path.with_extension("full"));
+    }
+}
+
 /// A task's file, and the blocks that are whole in it; what an earlier run left half-written is cut off.
 fn open(path: &Path) -> Result<(File, BTreeSet<Rect>), Error> {
     let cannot = cannot("use", path);
     let mut options = OpenOptions::new();
     let options = options.read(true).append(true).create(true);
-    let mut file = options.open(path).map_err(&cannot)?;
+    let file = options
+        .open(path)
+        .inspect_err(|error| note_full(path, error));
+    let mut file = file.map_err(&cannot)?;
     match file.try_lock() {
         // A file system that knows no locks has no two runs of a task either, as far as anybody can tell.
         Ok(()) | Err(TryLockError::Error(_)) => {}

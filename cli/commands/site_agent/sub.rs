@@ -46,9 +46,15 @@ fn put(place: &Path, order: &Order) -> Result<(), Error> {
     let text = serde_json::to_vec(order)
         .map_err(|error| Error::failed("cannot write the order").because(error))?;
     fs::create_dir(&fresh).map_err(cannot("make", &fresh))?;
-    write(&fresh.join("order.json"), &text)?;
-    let moved = fs::rename(&fresh, place).and_then(|()| sync_parent(place));
-    moved.map_err(cannot("make", place))
+    let put = write(&fresh.join("order.json"), &text).and_then(|()| {
+        let moved = fs::rename(&fresh, place).and_then(|()| sync_parent(place));
+        moved.map_err(cannot("make", place))
+    });
+    if put.is_err() {
+        // Where there is no room, what is left of it would take some.
+        let _ = fs::remove_dir_all(&fresh);
+    }
+    put
 }
 
 fn hand_over(camp: &Camp, order: &Order) -> Result<String, ClusterError> {

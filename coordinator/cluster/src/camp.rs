@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use model::Span;
 
-use crate::error::ClusterError;
+use crate::error::{ClusterError, Refusal};
 use crate::queue::{self, Queue, Task, TaskId, TaskState};
 use crate::sites::Site;
 use crate::way::{LIMIT, Way};
@@ -26,6 +26,9 @@ const END_LIMIT: Duration = Duration::from_secs(120);
 
 /// How often they are looked at meanwhile.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
+
+/// Bytes for which there must be room: with less, tasks would begin for a few blocks each.
+const ROOM_BYTES: u32 = 1 << 20;
 
 /// Logs that are kept at a site.
 const LOGS_MAX: u32 = 200;
@@ -142,6 +145,39 @@ impl Camp {
         let log = quote_path(&self.log(array).replace('%', &task.to_string()));
         let script = format!("tail -c 1000 {log} 2>/dev/null || :");
         self.way.ask("reading a log", "tail", &script)
+    }
+
+    /// Sees that its folder there takes more: by writing, since no count of free bytes knows of quotas.
+    pub fn has_room(&self) -> Result<(), ClusterError> {
+        let folder = quote_path(&self.folder());
+        let script = format!(
+            "d={folder}; while [ ! -d \"$d\" ]; do d=$(dirname \"$d\"); done; f=$d/.room.$$\n\
+             head -c {ROOM_BYTES} /dev/zero >\"$f\"; code=$?; rm -f \"$f\"; exit $code"
+        );
+        let found = self.way.ask("writing there", "head", &script);
+        found.map(|_| ()).map_err(|error| self.full(error))
+    }
+
+    /// An error of here, which names the folder where its cause is that nothing more can be written.
+    pub fn full(&self, error: ClusterError) -> ClusterError {
+        match error {
+            ClusterError::Refused {
+                refusal: Refusal::Disk,
+                said,
+                ..
+            } => self.is_full(said),
+            error => error,
+        }
+    }
+
+    /// That nothing more can be written into its folder there.
+    pub fn is_full(&self, said: String) -> ClusterError {
+        let here = || "this machine".to_owned();
+        ClusterError::Full {
+            folder: self.folder(),
+            host: self.site.address.clone().unwrap_or_else(here),
+            said,
+        }
     }
 
     /// Removes all but the latest logs.

@@ -93,6 +93,16 @@ pub enum ClusterError {
         /// What the queue said.
         said: String,
     },
+    /// Nothing more can be written there.
+    #[error("the folder {folder} on {host} is full, or its owner's quota is: {said}")]
+    Full {
+        /// The folder.
+        folder: String,
+        /// Where.
+        host: String,
+        /// What was said.
+        said: String,
+    },
     /// What was printed is not what the program should print.
     #[error("{attempt} gave an answer that cannot be understood ({what}): {said}")]
     Nonsense {
@@ -154,6 +164,9 @@ impl ClusterError {
             }
             Self::Program { .. } => "bring this one there: `flyby site install SITE`",
             Self::Refused { refusal, .. } => refusal.next(),
+            Self::Full { .. } => {
+                "make room there, and it goes on by itself; or name another `folder`"
+            }
             Self::Nonsense { .. } => {
                 "run the command there by hand; if it prints what it should, this is a mistake of this program"
             }
@@ -163,7 +176,7 @@ impl ClusterError {
     /// Whether it may be over later without anybody's doing.
     pub fn may_pass(&self) -> bool {
         match self {
-            Self::TimedOut { .. } | Self::Unreachable { .. } => true,
+            Self::TimedOut { .. } | Self::Unreachable { .. } | Self::Full { .. } => true,
             Self::Refused { refusal, .. } => {
                 matches!(refusal, Refusal::Quota | Refusal::Away | Refusal::Disk)
             }

@@ -68,11 +68,14 @@ impl There {
     pub fn camp(mut self, folder: &Path) -> Result<Camp, ClusterError> {
         if let Some(text) = &self.template {
             let path = folder.join("template");
-            fs::write(&path, text).map_err(|source| ClusterError::File {
-                attempted: "write the template",
-                path: path.display().to_string(),
-                source,
-            })?;
+            // A disk that is full disturbs nobody who only looks.
+            if fs::read_to_string(&path).ok().as_ref() != Some(text) {
+                fs::write(&path, text).map_err(|source| ClusterError::File {
+                    attempted: "write the template",
+                    path: path.display().to_string(),
+                    source,
+                })?;
+            }
             self.site.template = Some(path);
         }
         Ok(Camp::new(self.site, self.farm, folder))
@@ -227,6 +230,9 @@ pub struct Seen {
     pub arrays: Vec<SeenArray>,
     /// The scene descriptions and assets that are there.
     pub files: Vec<String>,
+    /// What is said there to whoever would write more; nothing where there is room.
+    #[serde(default)]
+    pub full: Option<String>,
 }
 
 /// How an array stands.
@@ -258,6 +264,15 @@ pub enum Stands {
     Away,
     /// It will not go on.
     Ended,
+    /// It will not go on, since it could not write what it had rendered.
+    Full,
+}
+
+impl Stands {
+    /// Whether it goes on, or may.
+    pub fn is_live(self) -> bool {
+        !matches!(self, Self::Ended | Self::Full)
+    }
 }
 
 /// A block of an answer: whose it is, and its entry in the task's file.

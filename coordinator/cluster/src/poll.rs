@@ -3,7 +3,8 @@
 //!
 //! What always holds: a tile is in at most one array; nothing ends unnoticed, since a task that will not go on and has
 //! not brought all its blocks gives its tile back, so that the rest is leased anew (thesis §C.5); after three tries
-//! without a block a tile fails; after a refusal nothing is submitted for a while, longer each time.
+//! without a block a tile fails; after a refusal nothing is submitted for a while, longer each time. While the site's folder is
+//! full only what runs stays there, and no tile is blamed.
 
 mod before;
 mod held;
@@ -32,6 +33,9 @@ const AWAY_LOOKS: u32 = 3;
 
 /// What became of a tile is forgotten so many observations after it was last leased.
 const REMEMBERED: u64 = 1_000;
+
+/// What tasks say that have come to nothing for lack of room.
+const COULD_NOT_WRITE: &str = "a task could not write its blocks";
 
 /// How long nothing is submitted after the first refusal; twice as long after each further one…
 const PAUSE_FIRST: Span = Span::from_secs(10);
@@ -93,6 +97,8 @@ pub struct Poll {
     stock: Stock,
     failures: u32,
     quiet_until: Timestamp,
+    /// What was said when nothing more could be written there.
+    full: Option<String>,
     standing: Standing,
 }
 
@@ -109,6 +115,7 @@ impl Poll {
             histories: BTreeMap::new(),
             failures: 0,
             quiet_until: Timestamp(0),
+            full: None,
             standing: Standing::default(),
         }
     }
@@ -125,7 +132,15 @@ impl Poll {
 
     /// Images that the site should hold.
     pub fn credit(&self) -> u32 {
-        self.stock.credit()
+        match self.full {
+            Some(_) => 0,
+            None => self.stock.credit(),
+        }
+    }
+
+    /// What was said where nothing more could be written there, when it was last looked at.
+    pub fn full(&self) -> Option<&String> {
+        self.full.as_ref()
     }
 
     /// Whether there is anything at the site, or should be.
@@ -242,6 +257,7 @@ impl Poll {
             .iter()
             .map(|array| (array.name.as_str(), array))
             .collect();
+        self.has_room(seen.full.clone());
         self.follow(&by_name, &mut actions);
         self.tidy(&by_name, &mut actions);
         let flow = self.flow(&by_name);
@@ -254,7 +270,7 @@ impl Poll {
 
     /// Arrays to submit, in this order; where one fails say so: [`Self::refused`].
     pub fn orders(&mut self, now: Timestamp) -> Vec<Order> {
-        match now >= self.quiet_until {
+        match now >= self.quiet_until && self.full.is_none() {
             true => self.put_into_arrays(),
             false => Vec::new(),
         }
@@ -277,6 +293,16 @@ impl Poll {
         self.standing.trouble = None;
     }
 
+    /// Whether there is room, or what was said. Where there is again, a pause is over.
+    fn has_room(&mut self, full: Option<String>) {
+        let was_full = std::mem::replace(&mut self.full, full).is_some();
+        if was_full && self.full.is_none() {
+            self.failures = 0;
+            self.quiet_until = Timestamp(0);
+            self.standing.trouble = None;
+        }
+    }
+
     /// Finds out how each tile's task stands; what ended too early goes back.
     fn follow(&mut self, seen: &BTreeMap<&str, &SeenArray>, actions: &mut Vec<Action>) {
         let mut ended = Vec::new();
@@ -296,6 +322,10 @@ impl Poll {
                     tile.place = None;
                 }
                 (None | Some(Stands::Ended), None) => ended.push((attempt, name, task)),
+                (Some(Stands::Full), None) => {
+                    self.full.get_or_insert_with(|| COULD_NOT_WRITE.to_owned());
+                    ended.push((attempt, name, task));
+                }
                 (Some(stands), None) => {
                     tile.runs = stands == Stands::Runs;
                     tile.away = match stands {
@@ -318,8 +348,8 @@ impl Poll {
             history.observation = self.observations;
             history.limit = self.arrays.get(&array).and_then(|array| array.time_limit);
             match tile.arrived - tile.inherited {
-                // It is nobody's fault but its host's.
-                0 if tile.away > 0 => {}
+                // It is nobody's fault but its host's, or its disk's.
+                0 if tile.away > 0 || self.full.is_some() => {}
                 0 => history.tries += 1,
                 blocks => {
                     history.tries = 0;
@@ -338,9 +368,22 @@ impl Poll {
                 false => back.push(attempt),
             }
         }
+        if self.full.is_some() {
+            back.extend(self.retreat());
+        }
         if !back.is_empty() {
             actions.push(Action::GiveBack(back));
         }
+    }
+
+    /// Where nothing more can be written nothing is begun: others may have what does not run.
+    fn retreat(&mut self) -> Vec<AttemptId> {
+        let tiles = self.tiles.iter().filter(|(_, tile)| !tile.runs);
+        let waiting: Vec<_> = tiles.map(|(&attempt, _)| attempt).collect();
+        for &attempt in &waiting {
+            self.forget(attempt);
+        }
+        waiting
     }
 
     /// Ends and removes what nobody needs, and counts what is live.
@@ -356,9 +399,7 @@ impl Poll {
             let array = self.arrays.entry(name.to_owned()).or_insert_with(unknown);
             array.is_sure |= there.is_submitted;
             let is_wanted = array.tiles.iter().any(Option::is_some);
-            let live = (1..)
-                .zip(&there.tasks)
-                .filter(|(_, task)| task.0 != Stands::Ended);
+            let live = (1..).zip(&there.tasks).filter(|(_, task)| task.0.is_live());
             let live: Vec<(u32, Stands)> = live.map(|(number, task)| (number, task.0)).collect();
             match (is_wanted, live.is_empty()) {
                 (false, true) => remove.push(name.to_owned()),

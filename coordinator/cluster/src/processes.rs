@@ -137,7 +137,7 @@ fn start(folder: &str, array: &Array, script: &str) -> String {
     let mut text = format!(
         "set -e; umask 077; d={folder}/{name}; log={log}; mkdir -p {folder} \"$(dirname \"$log\")\"\n\
          if [ -d \"$d\" ]; then exit 0; fi\n\
-         t=$d.new.$$; mkdir \"$t\"; cat /proc/sys/kernel/random/boot_id >\"$t/boot\"; echo {} >\"$t/count\"\n",
+         t=$d.new.$$; trap 'rm -rf \"$t\"' EXIT; mkdir \"$t\"; cat /proc/sys/kernel/random/boot_id >\"$t/boot\"; echo {} >\"$t/count\"\n",
         array.tasks
     );
     let _ = write!(
@@ -155,7 +155,11 @@ fn start(folder: &str, array: &Array, script: &str) -> String {
         text,
         "mv \"$t\" \"$d\"\ni=0\nwhile [ $i -lt {runners} ]; do i=$((i + 1))\n\
          setsid sh \"$d/runner\" \"$d\" \"$log\" </dev/null >/dev/null 2>&1 &\ndone\n\
-         while ! ls \"$d\"/*.runner >/dev/null 2>&1 && [ ! -e \"$d/1.exit\" ]; do sleep 0.05; done\n"
+         gone=\n\
+         while ! ls \"$d\"/*.runner >/dev/null 2>&1 && [ ! -e \"$d/1.exit\" ]; do\n\
+         if [ -n \"$gone\" ]; then cp \"$d/script\" \"$d/again\" || :; rm -rf \"$d\"; echo 'nobody stayed to take tasks' >&2; exit 1; fi\n\
+         kill -0 $! 2>/dev/null || gone=yes\n\
+         sleep 0.05\ndone\n"
     );
     text
 }

@@ -60,6 +60,8 @@ pub struct Program {
 pub struct Survey {
     /// The host.
     pub host: Result<Host, ClusterError>,
+    /// Whether the farm's folder takes more; `None` where the host cannot be reached.
+    pub room: Option<Result<(), ClusterError>>,
     /// Its queue; `None` where the host cannot be reached.
     pub queue: Option<Result<(About, Limits), ClusterError>>,
     /// The program; `None` where the host cannot be reached.
@@ -84,6 +86,7 @@ pub fn look(camp: &Camp, coordinator: Option<&str>, nodes: Nodes) -> Survey {
     let can = host.is_ok();
     let asked = coordinator.filter(|_| can && nodes == Nodes::One);
     Survey {
+        room: can.then(|| camp.has_room()),
         queue: can.then(|| queue.about().and_then(|about| Ok((about, queue.limits()?)))),
         program: can.then(|| program(site, way)),
         node: asked.map(|coordinator| node(camp, coordinator)),

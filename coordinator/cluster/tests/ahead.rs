@@ -211,6 +211,7 @@ impl There {
         Seen {
             arrays: self.arrays.iter().map(array).collect(),
             files: Vec::new(),
+            full: None,
         }
     }
 

@@ -97,7 +97,7 @@ impl Chaos {
     fn new(key: u64) -> Self {
         eprintln!("FLYBY_CHAOS_KEY={key}");
         let place = Place::new();
-        let disk = SmallDisk::mount(&place, DISK);
+        let disk = SmallDisk::mount(&place, &place.state(), DISK);
         let wrapper = disk.as_ref().map(SmallDisk::wrapper).unwrap_or_default();
         let options = [SHORT_LIMITS, LOG].concat();
         let mut farm = Farm::wrapped(place, &wrapper, &options);

@@ -189,6 +189,62 @@ fn three_tries_without_a_block_fail_a_tile_and_one_block_forgives() {
 }
 
 #[test]
+fn a_folder_that_is_full_blames_no_tile_keeps_what_runs_and_is_left_alone_until_there_is_room() {
+    let mut there = there();
+    for number in 0..3 {
+        there.poll.leased(lease(number, 0));
+    }
+    let order = there.submits().remove(0);
+    let is_full = |there: &There| (there.poll.credit(), there.poll.full().is_some());
+    assert_eq!(is_full(&there), (2, false));
+    // One runs, one waits, one could not write; and there is no room for more.
+    let stand = [Stands::Runs, Stands::Waits, Stands::Full];
+    for (task, stands) in there.seen.arrays[0].tasks.iter_mut().zip(stand) {
+        task.0 = stands;
+    }
+    there.seen.full = Some("no space left on device".into());
+    let back = Action::GiveBack(vec![attempt(2), attempt(1)]);
+    let delete = Action::Delete(vec![(order.name.clone(), Some(2))]);
+    assert_eq!(there.looks(), [back, delete]);
+    assert_eq!(is_full(&there), (0, true));
+    assert_eq!(there.poll.held(), [attempt(0)]);
+    // What is leased before that is heard goes back, too.
+    there.poll.leased(lease(10, 1));
+    assert_eq!(there.poll.orders(there.now), []);
+    assert_eq!(there.looks(), [Action::GiveBack(vec![attempt(10)])]);
+    // However often one tries.
+    for number in (100..600).step_by(100) {
+        there.are(Stands::Ended);
+        there.seen.full = Some("no space left on device".into());
+        there.looks();
+        there.seen.full = None;
+        there.poll.leased(lease(number, 0));
+        let orders = there.submits();
+        assert_eq!((is_full(&there), orders.len()), ((2, false), 1));
+        there.are(Stands::Full);
+        let actions = there.looks();
+        assert_eq!(actions[0], Action::GiveBack(vec![attempt(number)]));
+        assert_eq!(is_full(&there), (0, true), "what a task says is believed");
+    }
+}
+
+#[test]
+fn a_refusal_for_want_of_room_is_over_when_there_is_room() {
+    let mut there = there();
+    there.poll.leased(lease(0, 0));
+    let order = there.submits().remove(0);
+    there.seen.arrays.clear();
+    there.poll.refused(there.now, &order.name, "no room".into());
+    there.poll.quiet_until = there.now + Span::from_secs(1_000_000);
+    there.seen.full = Some("no space left on device".into());
+    assert_eq!(there.looks(), [Action::GiveBack(vec![attempt(0)])]);
+    there.seen.full = None;
+    there.poll.leased(lease(1, 0));
+    assert_eq!(there.submits().len(), 1);
+    assert_eq!(there.poll.standing().trouble, None);
+}
+
+#[test]
 fn what_was_refused_is_submitted_again_after_a_while_and_never_twice() {
     let mut there = there();
     there.poll.leased(lease(0, 0));

@@ -80,7 +80,7 @@ impl Errand {
                 }
                 Ok(Some(poller)) => return poller.run(&mut woken),
                 Err(error) => {
-                    let words = words(&error);
+                    let words = self.words(error);
                     tracing::warn!(site = self.camp.site.name, "{words}");
                     self.board
                         .change(&self.camp.site.name, |site| site.trouble = words);
@@ -190,7 +190,11 @@ impl Errand {
         if let Some((array, task)) = known.pilot.take_failed() {
             // What was there may be there no more.
             known.is_ready = false;
-            let said = self.camp.said(&array, task).unwrap_or_default();
+            let said = match self.camp.has_room() {
+                // Its log would be there, too.
+                Err(full @ ClusterError::Full { .. }) => self.words(full),
+                _ => self.camp.said(&array, task).unwrap_or_default(),
+            };
             known.pilot.has_said(&said);
             tracing::warn!(site, array, task, said, "an allocation failed");
         }
@@ -218,7 +222,7 @@ impl Errand {
                 known.pilot.submitted(&array, tasks);
             }
             Err(error) => {
-                let words = words(&error);
+                let words = self.words(error);
                 tracing::warn!(site, name, tasks, "{words}");
                 known.is_ready = false;
                 known.pilot.refused(now, words);
@@ -262,6 +266,18 @@ impl Errand {
         self.camp.trim_logs()
     }
 
+    /// An error of the site with its causes, and what to change.
+    pub(super) fn words(&self, error: ClusterError) -> String {
+        let error = self.camp.full(error);
+        let mut words = error.to_string();
+        let mut source = std::error::Error::source(&error);
+        while let Some(cause) = source {
+            words = format!("{words}: {cause}");
+            source = cause.source();
+        }
+        format!("{words}; {}", error.next())
+    }
+
     fn show(&self, standing: &Standing) {
         self.board.change(&self.camp.site.name, |site| {
             site.waiting = standing.waiting;
@@ -289,17 +305,6 @@ pub(super) fn program_makes(
             ),
         }),
     }
-}
-
-/// An error with its causes, and what to change.
-pub(super) fn words(error: &ClusterError) -> String {
-    let mut words = error.to_string();
-    let mut source = std::error::Error::source(error);
-    while let Some(cause) = source {
-        words = format!("{words}: {cause}");
-        source = cause.source();
-    }
-    format!("{words}; {}", error.next())
 }
 
 pub(super) fn unix_ms() -> u64 {

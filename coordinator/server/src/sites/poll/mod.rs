@@ -2,6 +2,7 @@
 //! which are asked after again and again. What is done is `cluster::poll`'s decision.
 
 mod desk;
+mod join;
 mod line;
 mod scenes;
 
@@ -13,17 +14,16 @@ use cluster::orders::{End, Order, Seen};
 use cluster::pilot::Wanted;
 use cluster::poll::{Action, Came, Poll, Settings};
 use cluster::{ClusterError, Limits, Site, survey};
-use model::{AttemptId, Lease, Span, Timestamp, WorkerId};
-use sched::{Event, Queue};
-use tokio::sync::{mpsc, oneshot};
+use model::{AttemptId, Lease, Timestamp};
+use sched::Event;
+use tokio::sync::mpsc;
 use wire::proto::control_down::Message;
 
 use self::desk::{Desk, Looked};
-use self::line::{Became, Cut, Hello, Line};
+use self::line::{Became, Cut, Line};
 use self::scenes::Scenes;
-use super::errand::{Errand, Stopping, program_makes, unix_ms, words};
+use super::errand::{Errand, Stopping, program_makes, unix_ms};
 use super::rest;
-use crate::input::{AboutWorker, Input, Query};
 
 /// After so many looks in a row that failed, others may have the site's tiles.
 const MISSED_MAX: u32 = 4;
@@ -33,13 +33,6 @@ const PAUSE_LONGEST: Duration = Duration::from_secs(300);
 
 /// The least time between two looks, however often there may be something new.
 const LOOK_LEAST: Duration = Duration::from_secs(1);
-
-/// How late what is heard of a task may be, beside the polls that may be missed: file systems of clusters tell a login node
-/// late, and each miss takes a while by itself.
-const SLACK: Span = Span::from_secs(120);
-
-/// Most threads that are told to the scheduler.
-const THREADS_MAX: u32 = 4_096;
 
 /// Why a round ended early.
 enum Trouble {
@@ -118,7 +111,7 @@ impl<'a> Poller<'a> {
                     poll
                 }
                 Err(Trouble::Site(error)) => {
-                    let words = words(&error);
+                    let words = self.errand.words(error);
                     tracing::warn!(site = self.name(), "{words}");
                     self.show(Some(words));
                     missed = missed.saturating_add(1);
@@ -189,13 +182,15 @@ impl<'a> Poller<'a> {
         }
         self.hear()?;
         // Nobody is asked about nothing.
-        if self.poll.is_empty() && self.scenes.is_empty() {
+        if self.poll.is_empty() && self.scenes.is_empty() && self.poll.full().is_none() {
             return Ok(());
         }
         let seen = self.fetch()?;
         // What was leased because of that.
         self.hear()?;
         let actions = self.poll.observe(&seen);
+        // Before anything is given back: what there is no room for shall not come again.
+        self.wants()?;
         // What is given back may come again at once.
         let comes_again = |action: &Action| matches!(action, Action::GiveBack(_));
         let may_tidy = !actions.iter().any(comes_again);
@@ -206,7 +201,6 @@ impl<'a> Poller<'a> {
         if let Some(line) = &self.line {
             line.runs(self.poll.running());
         }
-        self.wants()?;
         // What is leased because of all this is submitted now, and not at the next look: a slot may be free.
         let wanted = self.hear()?;
         let submitted = self.submit()?;
@@ -224,66 +218,6 @@ impl<'a> Poller<'a> {
         };
         self.errand.board.saw(self.name(), look);
         Ok(())
-    }
-
-    /// Joins the farm, with what the site still has of before.
-    fn connect(&mut self) -> Result<(), Trouble> {
-        let site = &self.errand.camp.site;
-        let seen = self.desk.see(&self.poll)?;
-        self.scenes.are(&seen.files);
-        let begun = self.poll.takes_up(&seen);
-        let slots = slots(site, &self.limits).unwrap_or(1);
-        let array_max = [site.max_array_size, self.limits.array_tasks];
-        let array_max = array_max.into_iter().flatten().min();
-        let hello = Hello {
-            worker: self.worker(),
-            revision: self.errand.revision,
-            threads: slots.saturating_mul(site.threads).clamp(1, THREADS_MAX),
-            queue: Queue {
-                min_tile_pixels: site.min_tile_pixels,
-                max_array_size: array_max.map_or(cluster::poll::ARRAY_TASKS.into(), u64::from),
-                lag: site.poll.times(u64::from(MISSED_MAX) + 1) + SLACK,
-                patience: site.patience,
-            },
-            about: AboutWorker {
-                name: site.label(),
-                build: String::new(),
-                simd_level: String::new(),
-                memory_bytes: site.memory_bytes.unwrap_or(0),
-                labels: site.labels.iter().cloned().chain([site.label()]).collect(),
-                time_left: None,
-            },
-            held: self.poll.held(),
-            begun,
-        };
-        let (inputs, gates) = (self.errand.inputs.clone(), self.errand.gates.clone());
-        let (line, live) = Line::open(hello, inputs, gates, self.errand.runtime.clone())?;
-        self.poll.keeps(&live);
-        // Others may have brought some of it, or a coordinator that was here before.
-        let (reply, answer) = oneshot::channel();
-        let query = Query::Missing(line.worker(), self.poll.held(), reply);
-        let asked = self.errand.inputs.blocking_send(Input::Ask(query));
-        asked.map_err(|_| Cut::Stopping)?;
-        let Ok(Ok(missing)) = answer.blocking_recv() else {
-            return Err(Cut::Stopping.into());
-        };
-        for (attempt, missing) in missing {
-            self.poll.lacks(attempt, &missing);
-        }
-        self.line = Some(line);
-        self.credit = 0;
-        self.wants()
-    }
-
-    /// The same process for as long as this coordinator runs.
-    fn worker(&self) -> WorkerId {
-        let digest = blake3::hash(self.errand.camp.prefix().as_bytes());
-        let mut id = [0; 8];
-        id.copy_from_slice(&digest.as_bytes()[..8]);
-        WorkerId {
-            id: u64::from_le_bytes(id),
-            incarnation: self.errand.epoch.0,
-        }
     }
 
     /// Says how many images it wants, where that has changed.
@@ -421,7 +355,7 @@ impl<'a> Poller<'a> {
                     submitted += u32::try_from(tasks).unwrap_or(u32::MAX);
                 }
                 Err(Trouble::Site(error)) => {
-                    let words = words(&error);
+                    let words = self.errand.words(error);
                     tracing::warn!(site = self.name(), name, tasks, "{words}");
                     self.is_ready = false;
                     let now = self.now();
@@ -472,6 +406,11 @@ impl<'a> Poller<'a> {
                 standing.away
             )
         });
+        let full = self.poll.full().map(|said| {
+            let error = self.errand.camp.is_full(said.clone());
+            self.errand.words(error)
+        });
+        let trouble = trouble.or(full);
         let trouble = trouble.or_else(|| standing.trouble.clone()).or(away);
         let wanted = u32::try_from(self.poll.held().len()).unwrap_or(u32::MAX);
         self.errand.board.change(self.name(), |site| {
