@@ -24,6 +24,7 @@ mod failures;
 mod full_disk;
 mod hook;
 mod hostile_messages;
+mod kubernetes;
 mod ranks;
 mod readers;
 mod readme;
