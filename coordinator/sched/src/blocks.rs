@@ -1,16 +1,15 @@
 //! Blocks: what is durable counts, once.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use model::{Digest, ImageRef, Rect, Span, Timestamp, WorkerId};
 
 use crate::attempt::Attempt;
-use crate::check::{Check, Made};
+use crate::check::Made;
 use crate::job::Job;
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
-use crate::verify::is_drawn;
+use crate::verify::to_check;
 use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
 
 /// A block that arrived, and what was found about it.
@@ -23,7 +22,6 @@ struct Arrival {
     /// Why a block that was durable before was rendered again.
     purpose: Purpose,
     elapsed: Span,
-    pixels: Digest,
 }
 
 /// What a durable block added to its image.
@@ -79,7 +77,7 @@ impl Job {
 
 /// Whose pixels of a block are durable.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Durable {
+pub(crate) enum Durable {
     /// Those that have just arrived, all of them.
     ByThis,
     /// Some that arrived before.
@@ -107,7 +105,10 @@ impl Sched {
         };
         let place = match self.place_of_block(block) {
             Ok(Some(place)) => place,
-            Ok(None) => return out.push(ack),
+            Ok(None) => {
+                self.has_part(worker, None, image);
+                return out.push(ack);
+            }
             Err(refusal) => {
                 return out.push(Effect::RefuseBlock {
                     worker,
@@ -125,13 +126,6 @@ impl Sched {
         let Added {
             new, tile, purpose, ..
         } = added;
-        // Nobody is found to lie where nothing is verified.
-        if new > 0
-            && self.config.verify > 0
-            && let Some(work) = job.work.get_mut(&place)
-        {
-            work.makers.insert(worker);
-        }
         // What an attempt delivered that nobody knows any more counts all the same.
         let is_recalled =
             attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
@@ -145,9 +139,26 @@ impl Sched {
             new,
             purpose,
             elapsed,
-            pixels,
         };
-        self.credit_attempt(worker, &arrival, out);
+        let made = Made {
+            rect,
+            pixels,
+            by: worker,
+        };
+        let durable = match new == rect.area() {
+            true => Durable::ByThis,
+            false => Durable::Before,
+        };
+        let live = self.owned(worker, attempt);
+        self.has_part(worker, live, image);
+        let counts = match live {
+            Some(number) => self.credit_attempt(number, &arrival),
+            // Its attempt ended while it was written: what was let in counts for all that it would have counted for.
+            None => !is_recalled,
+        };
+        if counts {
+            self.hold_against_others(live, block, (made, durable), out);
+        }
         if let Some(tile) = added.done_tile() {
             self.tile_done(image, tile, worker, out);
         }
@@ -188,19 +199,16 @@ impl Sched {
         }
     }
 
-    /// Notes with its attempt and worker, where they are there, that a block arrived.
+    /// Notes with its attempt and worker that a block arrived, and says whether that is for the first time.
     /// One that is sent again counts once.
-    fn credit_attempt(&mut self, id: WorkerId, arrival: &Arrival, out: &mut Vec<Effect>) {
+    fn credit_attempt(&mut self, number: u64, arrival: &Arrival) -> bool {
         let BlockRef { image, rect, .. } = arrival.block;
-        let Some(number) = self.owned(id, arrival.block.attempt) else {
-            return;
-        };
         let Some(attempt) = self.attempts.get_mut(number) else {
-            return;
+            return false;
         };
         let fits = attempt.image == image && Some(attempt.tile) == arrival.tile;
         if !fits || !attempt.arrives(rect) {
-            return;
+            return false;
         }
         // A worker may claim any time; it cannot have taken longer than it had.
         let elapsed = arrival.elapsed.min(self.now - attempt.leased);
@@ -238,43 +246,7 @@ impl Sched {
         if !is_last {
             self.progress(number);
         }
-        let durable = match arrival.new == rect.area() {
-            true => Durable::ByThis,
-            false => Durable::Before,
-        };
-        let made = Made {
-            rect,
-            pixels: arrival.pixels,
-            by: id,
-        };
-        if self.is_check(number) {
-            self.checked(number, arrival.block, made, out);
-        } else if self.differs(number, made, durable) {
-            self.differed(number, arrival.block, made, out);
-        }
-    }
-
-    /// Compares a block with what the other attempt at its tile made of it, if that is known.
-    fn differs(&mut self, number: u64, made: Made, durable: Durable) -> bool {
-        let verify = self.config.verify;
-        let attempt = &self.attempts[number];
-        let (image, tile) = (attempt.image, attempt.tile);
-        let Some((job, place)) = self.job_and_place(image) else {
-            return false;
-        };
-        let work = job.work.get_mut(&place);
-        let Some(tile) = work.and_then(|work| work.tiles.get_mut(tile)) else {
-            return false;
-        };
-        if let Some(first) = tile.evidence.first(made.rect) {
-            return first.pixels != made.pixels;
-        }
-        // Only while two are at work on it can there be another one to compare it with, or later.
-        let is_compared = tile.live_count() > 1 || is_drawn(verify, image, tile.region);
-        if is_compared && durable == Durable::ByThis {
-            tile.evidence.add_first(made);
-        }
-        false
+        true
     }
 
     /// Ends the attempts at a tile of which every pixel is durable. One that has
@@ -297,13 +269,7 @@ impl Sched {
             return;
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
-        let is_drawn = is_drawn(verify, image, done.region)
-            && done.evidence.firsts().len() == done.rect.blocks().count();
-        let is_doubted = verify > 0 && !done.evidence.dissents().is_empty();
-        if is_drawn || is_doubted {
-            let evidence = core::mem::take(&mut done.evidence);
-            done.check = Some(Box::new(Check::of(evidence)));
-        }
+        done.check = to_check(verify, image, (done.region, done.rect), &mut done.evidence);
         let live: [Option<u64>; 2] = {
             let mut attempts = done.attempts();
             [attempts.next(), attempts.next()]

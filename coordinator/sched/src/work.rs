@@ -12,7 +12,7 @@ use core::cmp::Reverse;
 
 use model::{Rect, Timestamp, WorkerId};
 
-use crate::check::{Checks, Evidence, Waiting};
+use crate::check::{Check, Checks, Evidence, Known, Waiting};
 use crate::costs::{CostMap, scale};
 use crate::pixels::PixelsDone;
 use crate::region::Region;
@@ -519,11 +519,7 @@ impl Work {
                 evidence,
             });
         } else if let Some(check) = tile.check.filter(|check| !check.is_done()) {
-            self.checks.push_back(Waiting {
-                region,
-                check: *check,
-                since: now,
-            });
+            self.put_check(region, *check, now);
             return Reopened::Checks;
         }
         Reopened::Plain
@@ -587,6 +583,66 @@ impl Work {
         let cell = self.grid.index_of(block)?;
         let tile = self.cells[cell as usize];
         (tile != NO_TILE).then_some(tile)
+    }
+
+    /// What is known of a block's pixels, wherever it is.
+    pub(crate) fn known_of(&mut self, block: Rect) -> Option<Known<'_>> {
+        if let Some(tile) = self.tile_of(block) {
+            let tile = self.tiles.get_mut(tile)?;
+            let live = tile.live_count();
+            return Some(match &mut tile.check {
+                Some(check) => Known::Check(check),
+                None => Known::Evidence {
+                    evidence: &mut tile.evidence,
+                    region: tile.region,
+                    live,
+                },
+            });
+        }
+        let grid = self.grid;
+        let holds = |region: Region| region.rect(grid).contains(block);
+        let mut waiting = self.checks.iter_mut();
+        if let Some(waiting) = waiting.find(|waiting| holds(waiting.region)) {
+            return Some(Known::Check(&mut waiting.check));
+        }
+        let mut pieces = self.pieces.values_mut().chain(&mut self.troubled);
+        let piece = pieces.find(|piece| holds(piece.region))?;
+        Some(Known::Evidence {
+            evidence: &mut piece.evidence,
+            region: piece.region,
+            live: 0,
+        })
+    }
+
+    /// Lets go of the piece around a block where nothing of it is missing; its pixels, and what was made of them.
+    pub(crate) fn take_whole(&mut self, block: Rect) -> Option<(Region, Rect, Evidence)> {
+        let grid = self.grid;
+        let is_whole = |piece: &Piece| {
+            let rect = piece.region.rect(grid);
+            rect.contains(block) && self.missing(rect) == 0
+        };
+        let plain = self.pieces.iter().find(|(_, piece)| is_whole(piece));
+        let plain = plain.map(|(&order, _)| order);
+        let piece = match plain {
+            Some(order) => self.pieces.remove(&order),
+            None => {
+                let index = self.troubled.iter().position(is_whole)?;
+                self.troubled.remove(index)
+            }
+        }?;
+        let amount = self.amount(piece.region);
+        self.open.pixels -= amount.pixels;
+        self.open.cost -= amount.cost;
+        Some((piece.region, piece.region.rect(grid), piece.evidence))
+    }
+
+    /// Has pixels that are all durable wait to be rendered once more.
+    pub(crate) fn put_check(&mut self, region: Region, check: Check, now: Timestamp) {
+        self.checks.push_back(Waiting {
+            region,
+            check,
+            since: now,
+        });
     }
 
     /// The blocks of a tile that a worker is to render, in order; empty where all are.
