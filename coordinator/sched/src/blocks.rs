@@ -4,13 +4,12 @@ use alloc::vec::Vec;
 
 use model::{Digest, ImageRef, Rect, Span, Timestamp, WorkerId};
 
-use crate::attempt::Attempt;
 use crate::check::Made;
 use crate::job::Job;
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
 use crate::verify::to_check;
-use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
+use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, Sched};
 
 /// A block that arrived, and what was found about it.
 struct Arrival {
@@ -249,8 +248,7 @@ impl Sched {
         true
     }
 
-    /// Ends the attempts at a tile of which every pixel is durable. One that has
-    /// delivered all it was leased for knows; the others are told.
+    /// Ends the attempts at a tile of which every pixel is durable.
     pub(crate) fn tile_done(
         &mut self,
         image: ImageRef,
@@ -270,18 +268,8 @@ impl Sched {
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
         done.check = to_check(verify, image, (done.region, done.rect), &mut done.evidence);
-        let live: [Option<u64>; 2] = {
-            let mut attempts = done.attempts();
-            [attempts.next(), attempts.next()]
-        };
-        for number in live.into_iter().flatten() {
-            let attempt = self.attempts.get(number);
-            if attempt.is_some_and(Attempt::is_delivered) {
-                self.end_attempt(number);
-            } else {
-                self.revoke(number, RevokeReason::TileDone, out);
-            }
-        }
+        let live = done.attempts();
+        self.end_all(live, out);
         self.clear(by, image.job);
         if !failed_on.is_empty() {
             self.blame(image.job, &failed_on, by, out);

@@ -147,6 +147,12 @@ impl Check {
         !self.unable.contains(&worker) && self.blocks_for(worker).next().is_some()
     }
 
+    /// Whether a worker could be given all that is left of it.
+    pub(crate) fn suits_whole(&self, worker: WorkerId) -> bool {
+        let all = self.evidence.firsts().len();
+        !self.unable.contains(&worker) && self.blocks_for(worker).count() == all
+    }
+
     /// The blocks that a worker rendered none of.
     fn blocks_for(&self, worker: WorkerId) -> impl Iterator<Item = Rect> {
         let (first, dissent) = (self.evidence.firsts(), self.evidence.dissents());

@@ -11,7 +11,6 @@ use model::{JobId, WorkerId};
 
 use crate::blocks::Durable;
 use crate::check::{Finding, Known, Made};
-use crate::tile::Tile;
 use crate::verify::{is_drawn, takes_now, to_check};
 use crate::{BlockRef, Effect, RevokeReason, Sched};
 
@@ -123,10 +122,10 @@ impl Sched {
                 return;
             }
         }
-        match (live, is_last) {
-            (_, Some(number)) => self.check_ends(number, made.by, out),
-            (None, _) => self.check_may_be_done(block, out),
-            (Some(_), None) => {}
+        self.check_may_be_done(block, out);
+        // One that delivered all of it has ended with it.
+        if let Some(number) = is_last.filter(|&number| self.attempts.get(number).is_some()) {
+            self.check_ends(number, made.by, out);
         }
     }
 
@@ -136,7 +135,7 @@ impl Sched {
         }
     }
 
-    /// Where a block that came late was the last that was to be rendered once more, nobody need.
+    /// Where a block was the last that was to be rendered once more, nobody does so any more.
     fn check_may_be_done(&mut self, block: BlockRef, out: &mut Vec<Effect>) {
         let Some((job, place)) = self.job_and_place(block.image) else {
             return;
@@ -144,18 +143,16 @@ impl Sched {
         let Some(work) = job.work.get_mut(&place) else {
             return;
         };
-        work.checks.retain(|waiting| !waiting.check.is_done());
         let tile = work.tile_of(block.rect);
-        let tile = tile.and_then(|tile| work.tiles.get(tile)).filter(|tile| {
-            let check = tile.check.as_ref();
-            check.is_some_and(|check| check.is_done())
-        });
-        for number in tile
-            .into_iter()
-            .flat_map(Tile::attempts)
-            .collect::<Vec<_>>()
-        {
-            self.revoke(number, RevokeReason::TileDone, out);
+        let tile = tile.and_then(|tile| work.tiles.get(tile));
+        match tile.and_then(|tile| Some((tile, tile.check.as_ref()?))) {
+            Some((tile, check)) if check.is_done() => {
+                let live = tile.attempts();
+                self.end_all(live, out);
+            }
+            Some(_) => {}
+            // It came late, and nobody had begun.
+            None => work.checks.retain(|waiting| !waiting.check.is_done()),
         }
     }
 

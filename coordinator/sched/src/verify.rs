@@ -126,7 +126,8 @@ impl Sched {
         if let Some(tile) = self.checked_tile(number)
             && let Some(mut check) = tile.check.take()
         {
-            match check.fails(by) >= max {
+            let is_alone = tile.live_count() == 1;
+            match check.fails(by) >= max && is_alone {
                 true => given_up = Some(*check),
                 false => tile.check = Some(check),
             }
