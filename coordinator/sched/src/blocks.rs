@@ -24,20 +24,23 @@ struct Arrival {
 }
 
 /// What a durable block added to its image.
-#[derive(Clone, Copy)]
+#[derive(Clone, Debug)]
 pub(crate) struct Added {
     /// Pixels that were not durable before.
     pub(crate) new: u64,
     /// Its tile, while that is leased.
     tile: Option<u32>,
     tile_is_done: bool,
+    /// Tiles that are done where it is part of none: its image was cut anew while it was written.
+    others_done: Vec<u32>,
     purpose: Purpose,
 }
 
 impl Added {
-    /// Its tile, where that is leased and nothing of it is left to render.
-    pub(crate) fn done_tile(self) -> Option<u32> {
-        self.tile.filter(|_| self.tile_is_done)
+    /// Tiles that are leased and of which nothing is left to render.
+    pub(crate) fn done_tiles(self) -> impl Iterator<Item = u32> {
+        let tile = self.tile.filter(|_| self.tile_is_done);
+        tile.into_iter().chain(self.others_done)
     }
 }
 
@@ -54,8 +57,12 @@ impl Job {
             new,
             tile: work.tile_of(rect),
             tile_is_done: false,
+            others_done: Vec::new(),
             purpose: Purpose::First,
         };
+        if !work.is_in_a_cell(rect) && new > 0 {
+            added.others_done = work.count_anew(rect);
+        }
         if let Some(tile) = added.tile.and_then(|tile| work.tiles.get_mut(tile)) {
             tile.missing -= new;
             added.tile_is_done = tile.missing == 0 && tile.check.is_none();
@@ -122,9 +129,7 @@ impl Sched {
         let Some(added) = job.add_durable(place, rect, self.now) else {
             return;
         };
-        let Added {
-            new, tile, purpose, ..
-        } = added;
+        let (new, tile, purpose) = (added.new, added.tile, added.purpose);
         // What an attempt delivered that nobody knows any more counts all the same.
         let is_recalled =
             attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
@@ -158,7 +163,7 @@ impl Sched {
         if counts {
             self.hold_against_others(live, block, (made, durable), out);
         }
-        if let Some(tile) = added.done_tile() {
+        for tile in added.done_tiles() {
             self.tile_done(image, tile, worker, out);
         }
         self.finish_image(image, out);

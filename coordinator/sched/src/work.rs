@@ -12,6 +12,7 @@ use core::cmp::Reverse;
 
 use model::{Rect, Timestamp, WorkerId};
 
+use crate::attempt::is_block_of;
 use crate::check::{Check, Checks, Evidence, Known, Waiting};
 use crate::costs::{CostMap, scale};
 use crate::pixels::PixelsDone;
@@ -226,9 +227,10 @@ impl Work {
         self.queue = Some(queue);
     }
 
-    /// Cuts it anew, where nobody holds a tile of it.
+    /// Cuts it anew, where nobody holds a tile of it and nothing is to be known of what they made.
     pub(crate) fn cut_anew(&mut self, grid: TileGrid, map: Option<Arc<CostMap>>) {
-        if self.grid != grid && self.tiles.is_empty() {
+        let is_free = self.tiles.is_empty() && self.checks.is_empty() && !self.given_up;
+        if self.grid != grid && is_free {
             let pixels = core::mem::replace(&mut self.pixels, PixelsDone::none(grid.window()));
             let (spent, makers) = (self.spent, core::mem::take(&mut self.makers));
             *self = Self {
@@ -585,8 +587,35 @@ impl Work {
         (tile != NO_TILE).then_some(tile)
     }
 
-    /// What is known of a block's pixels, wherever it is.
+    /// Whether pixels are part of one cell: those of a block are, unless the image was cut anew since.
+    pub(crate) fn is_in_a_cell(&self, block: Rect) -> bool {
+        self.grid.index_of(block).is_some()
+    }
+
+    /// Counts anew what is missing of the tiles around some pixels; those of which nothing is.
+    pub(crate) fn count_anew(&mut self, rect: Rect) -> Vec<u32> {
+        let tiles = self.tiles.iter();
+        let touched = tiles.filter(|(_, tile)| tile.rect.intersection(rect).is_some());
+        let missing = touched.map(|(number, tile)| (number, self.missing(tile.rect)));
+        let missing: Vec<(u32, u64)> = missing.collect();
+        let mut done = Vec::new();
+        for (number, missing) in missing {
+            if let Some(tile) = self.tiles.get_mut(number) {
+                let was_missing = core::mem::replace(&mut tile.missing, missing);
+                if missing == 0 && was_missing > 0 {
+                    done.push(number);
+                }
+            }
+        }
+        done
+    }
+
+    /// What is known of a block's pixels, wherever it is; nothing where it is no block as the image is cut now.
     pub(crate) fn known_of(&mut self, block: Rect) -> Option<Known<'_>> {
+        let cell = self.grid.tile(self.grid.index_of(block)?);
+        if !is_block_of(cell, block) {
+            return None;
+        }
         if let Some(tile) = self.tile_of(block) {
             let tile = self.tiles.get_mut(tile)?;
             let live = tile.live_count();

@@ -2,8 +2,8 @@
 
 mod situation;
 
-use model::{Digest, JobId, Span};
-use sched::{Effect, Event, ImageState, LinkId, RevokeReason, Verdict};
+use model::{AttemptId, Begun, Digest, Epoch, JobId, Rect, Span};
+use sched::{Effect, Event, ImageState, LinkId, Offer, Queue, RevokeReason, Verdict};
 use situation::*;
 
 /// A block passes the fence.
@@ -153,4 +153,51 @@ fn what_was_on_its_way_when_its_worker_was_expelled_is_rendered_again() {
     assert!(effects.contains(&again(0)) && !effects.contains(&again(1)));
     is_stored(&mut farm, (1, 4), (1, 2), 66);
     assert!(farm.never_mind().contains(&again(1)));
+}
+
+#[test]
+fn a_block_of_an_image_that_was_cut_anew_meanwhile_ends_all_tiles_that_it_fills() {
+    let mut farm = farm();
+    farm.job(1).worker(2, 1).never_mind();
+    passes(&farm, (2, 1), 0, 1);
+    has_left(&mut farm, 2);
+    // A site takes up what it had begun for an earlier coordinator, and the rest with it, in tiles of 16x16.
+    let begun = Begun {
+        attempt: AttemptId {
+            epoch: Epoch(EPOCH.0 - 1),
+            number: 9,
+        },
+        image: image_ref(0),
+        tile: Rect {
+            x0: 0,
+            y0: 0,
+            x1: 16,
+            y1: 16,
+        },
+    };
+    farm.is_told(Event::WorkerJoined {
+        worker: worker(1),
+        link: LinkId(9),
+        offer: Offer {
+            queue: Some(Queue {
+                min_tile_pixels: 256,
+                max_array_size: 16,
+                lag: Span::from_secs(60),
+                patience: Span::from_secs(600),
+            }),
+            ..offer()
+        },
+        held: vec![begun.attempt],
+        begun: vec![begun],
+    })
+    .wants_tiles(1, 1);
+    assert_eq!(leased(&mut farm).len(), 15);
+    is_stored(&mut farm, (2, 1), (0, 1), 7);
+    let effects = farm.never_mind();
+    let is_done = |effect: &&Effect| {
+        let done = RevokeReason::TileDone;
+        matches!(effect, Effect::Revoke { reason, .. } if *reason == done)
+    };
+    assert_eq!(effects.iter().filter(is_done).count(), 4);
+    assert_eq!(farm.sched.image(image_ref(0)).unwrap().pixels_done, 1_024);
 }
