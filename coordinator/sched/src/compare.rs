@@ -11,7 +11,7 @@ use model::{JobId, WorkerId};
 
 use crate::blocks::Durable;
 use crate::check::{Finding, Known, Made};
-use crate::verify::{is_drawn, takes_now, to_check};
+use crate::verify::{checks_now, is_drawn, to_check};
 use crate::{BlockRef, Effect, RevokeReason, Sched};
 
 impl Sched {
@@ -208,6 +208,6 @@ impl Sched {
             return false;
         };
         let mut workers = self.workers.iter();
-        workers.any(|(_, worker)| takes_now(worker, job) && !by.contains(&worker.id))
+        workers.any(|(_, worker)| checks_now(worker, job) && !by.contains(&worker.id))
     }
 }

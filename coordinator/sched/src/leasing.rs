@@ -52,9 +52,11 @@ impl Sched {
                 }
             }
             if helped == HELPS_MAX || !self.help_to_end(out) {
-                return;
+                break;
             }
         }
+        // A check that was called back waits for whoever it was called back for.
+        self.unlooked.clear();
     }
 
     /// A worker that serves a kind of which a job has tiles, and the job that its next tile comes from.

@@ -254,7 +254,7 @@ impl Sched {
     fn may_do(&self, job: &Job, work: &Work, waiting: &Waiting) -> bool {
         let mut workers = self.workers.iter();
         workers.any(|(_, worker)| {
-            takes_now(worker, job)
+            checks_now(worker, job)
                 && waiting.check.suits(worker.id)
                 && self
                     .ask(worker, job)
@@ -299,15 +299,19 @@ impl Sched {
     }
 }
 
-/// Whether a worker takes tiles of a job at this moment.
-pub(crate) fn takes_now(worker: &Worker, job: &Job) -> bool {
-    worker.is_able() && worker.kinds.contains(job.kind) && worker.aside.job(job.id).is_none()
+/// Whether a worker renders something of a job once more where that is asked at this moment.
+pub(crate) fn checks_now(worker: &Worker, job: &Job) -> bool {
+    checks(worker, job) && worker.is_able() && worker.aside.job(job.id).is_none()
 }
 
 /// Whether a worker may do a check some time, if it is not lost before.
 fn could_ever(worker: &Worker, job: &Job, check: &Check) -> bool {
-    let serves = worker.kinds.contains(job.kind) && worker.aside.expelled().is_none();
-    serves && check.suits(worker.id)
+    checks(worker, job) && worker.aside.expelled().is_none() && check.suits(worker.id)
+}
+
+/// Whether a worker is of those that do checks of a job: a queue takes whole images.
+fn checks(worker: &Worker, job: &Job) -> bool {
+    worker.kinds.contains(job.kind) && worker.offer.queue.is_none()
 }
 
 impl Job {
