@@ -169,7 +169,7 @@ impl Sched {
         };
         let blocks = missing.len() as u64;
         let cost = job.costs.of_blocks(missing.into_iter())?;
-        let able = self.able_for(job);
+        let able = self.able_beside_queues(job);
         let suits = match &tile.check {
             Some(check) => check.suits_whole(worker),
             None => tile.trouble.suits(worker, able),

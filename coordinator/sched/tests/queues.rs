@@ -345,6 +345,18 @@ fn who_wants_more_images_gets_them_at_once() {
 }
 
 #[test]
+fn what_failed_where_it_was_begun_does_not_wait_for_a_queue() {
+    let mut farm = farm();
+    farm.job(1).worker(LOCAL, 2);
+    comes(&mut farm, SNOWDON, &[]);
+    farm.wants_tiles(SITE, 1).never_mind();
+    farm.fails(LOCAL, 1);
+    // It was cut for nobody else, and who began it tries again once it says that it has room.
+    let again = leases(&mut farm, LOCAL);
+    assert_eq!(again[&0].len(), 1);
+}
+
+#[test]
 fn nobody_waits_for_a_queue_to_check_anything() {
     let mut farm = suspicious();
     farm.job(1).worker(LOCAL, 2);
