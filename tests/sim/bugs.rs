@@ -57,6 +57,11 @@ fn unbounded_queue() {
 }
 
 #[test]
+fn missing_ignored() {
+    is_caught(Bug::FetchedAgain, "what is durable is not fetched again");
+}
+
+#[test]
 fn waiting_forgotten() {
     is_caught(Bug::NoPatience, "jobs that wait are not begun");
 }

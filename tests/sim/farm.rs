@@ -11,6 +11,7 @@ use crate::disk::Pixels;
 use crate::message::{Down, Up};
 use crate::plan::{Plan, Troubles};
 use crate::random::Random;
+use crate::site::Site;
 use crate::user::User;
 use crate::worker::{self, Worker};
 
@@ -42,6 +43,7 @@ enum Happening {
 enum Whose {
     Coordinator,
     Worker(WorkerId),
+    Site(usize),
 }
 
 /// Messages of one direction and kind stay in order.
@@ -51,6 +53,7 @@ pub(crate) struct Farm {
     pub(crate) coordinator: Coordinator,
     user: User,
     workers: BTreeMap<WorkerId, Worker>,
+    sites: Vec<Site>,
     /// Events of workers that are gone.
     events: u64,
     /// The link of each worker, as the network sees it.
@@ -84,6 +87,7 @@ impl Farm {
             coordinator: Coordinator::new(plan),
             user: User::new(&plan, &mut random),
             workers: BTreeMap::new(),
+            sites: Vec::new(),
             events: 0,
             links: BTreeMap::new(),
             links_made: 0,
@@ -100,6 +104,11 @@ impl Farm {
         };
         for id in 0..plan.workers {
             farm.hire(id, Span(0));
+        }
+        for number in 0..plan.sites {
+            let mut site = Site::new(number, &mut farm.random);
+            site.begins(farm.now, &mut farm.coordinator);
+            farm.sites.push(site);
         }
         farm.plan(Span(0), Happening::Trouble);
         farm
@@ -129,10 +138,15 @@ impl Farm {
         for id in self.workers.keys().copied().collect::<Vec<_>>() {
             self.tell_worker(id, Event::StopAsked);
         }
+        for site in &mut self.sites {
+            site.leaves();
+        }
         // The longest freeze that is drawn is 100 s.
         let rest = self.now + Span::from_secs(300);
         while self.now < rest && self.step() {}
         assert!(self.workers.is_empty(), "whoever is asked to stop does");
+        let has_left = self.sites.iter().all(Site::has_left);
+        assert!(has_left, "nothing is left at a site");
         assert!(self.coordinator.is_up && self.coordinator.is_at_rest());
         assert_eq!(
             self.coordinator.sched.workers().count(),
@@ -173,7 +187,12 @@ impl Farm {
             let due = worker.next_deadline()?;
             Some((due, Whose::Worker(id)))
         });
-        let (due, whose) = workers.chain(coordinator).min()?;
+        let sites = self.sites.iter().enumerate().filter_map(|(number, site)| {
+            // It is of the coordinator's process.
+            let due = site.due()?.max(self.paused_until);
+            Some((due, Whose::Site(number)))
+        });
+        let (due, whose) = workers.chain(coordinator).chain(sites).min()?;
         Some((due.max(self.now), whose))
     }
 
@@ -181,6 +200,10 @@ impl Farm {
         match whose {
             Whose::Coordinator => self.coordinator.tell(self.now, sched::Event::Tick),
             Whose::Worker(id) => self.tell_worker(id, Event::Tick),
+            Whose::Site(number) => {
+                let (now, links) = (self.now, &mut self.links_made);
+                return self.sites[number].goes_on(now, links, &mut self.coordinator);
+            }
         }
         let next = self.next_tick();
         let is_later = |(due, next)| next != whose || due > self.now;
@@ -211,7 +234,12 @@ impl Farm {
             Happening::Up(id, link, message) => {
                 self.coordinator.hears(self.now, id, link, message);
             }
-            Happening::Restart => self.coordinator.restart(self.now),
+            Happening::Restart => {
+                self.coordinator.restart(self.now);
+                for site in &mut self.sites {
+                    site.begins(self.now, &mut self.coordinator);
+                }
+            }
             Happening::Room => self.coordinator.disk.is_full = false,
             Happening::Closed(worker, link) => {
                 let link = LinkId(link);
@@ -321,12 +349,23 @@ impl Farm {
     fn grant(&mut self) {
         for wish in self.coordinator.wishes() {
             match wish {
-                coordinator::Wish::Send(id, message) => self.send_down(id, message),
+                coordinator::Wish::Send(id, message) => match self.site(id) {
+                    // In the same process.
+                    Some(number) => self.sites[number].hears(self.now, message, &self.coordinator),
+                    None => self.send_down(id, message),
+                },
                 coordinator::Wish::Disk(later, mean) => {
                     let took = self.random.span(mean);
                     self.plan(took, Happening::Disk(later));
                 }
-                coordinator::Wish::Close(id) => self.cut(id),
+                coordinator::Wish::Close(id) => match self.site(id) {
+                    Some(number) => {
+                        let is_lost = !self.sites[number].has_left();
+                        self.coordinator.witness.lost += u64::from(is_lost);
+                        self.sites[number].is_cut(self.now);
+                    }
+                    None => self.cut(id),
+                },
                 coordinator::Wish::Tell(submission, job) => self.user.hears(submission, job),
             }
         }
@@ -346,6 +385,11 @@ impl Farm {
         for id in leaving {
             self.dismiss(id);
         }
+    }
+
+    /// The site that is this worker to the scheduler.
+    fn site(&self, id: WorkerId) -> Option<usize> {
+        self.sites.iter().position(|site| site.is(id))
     }
 
     fn grant_worker(&mut self, id: WorkerId, wish: worker::Wish) {
@@ -476,6 +520,7 @@ impl Farm {
                 self.kill(id);
             }
         }
+        self.trouble_sites();
         self.trouble_coordinator();
         if self.coordinator.is_up {
             let wishes = self.random.happens(self.troubles.wishes);
@@ -520,6 +565,15 @@ impl Farm {
         }
     }
 
+    fn trouble_sites(&mut self) {
+        for site in &mut self.sites {
+            site.dies(self.troubles.deaths);
+            if self.random.happens(self.troubles.aways) {
+                site.is_away(self.now + self.random.span(Span::from_secs(60)));
+            }
+        }
+    }
+
     fn trouble_coordinator(&mut self) {
         let troubles = self.troubles;
         if self.random.happens(troubles.partitions) {
@@ -558,6 +612,9 @@ impl Farm {
     /// The coordinator's machine loses its power, and what was on its way to it or planned by it.
     fn crash(&mut self) {
         self.coordinator.crash(&mut self.random);
+        for site in &mut self.sites {
+            site.ends();
+        }
         self.agenda
             .retain(|_, happening| !matches!(happening, Happening::Disk(_)));
         for id in self.links.keys().copied().collect::<Vec<_>>() {

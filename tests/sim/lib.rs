@@ -4,8 +4,9 @@
 //! Messages are late and come twice; links are cut; workers are killed, frozen, cut off, drained, stopped, slow and
 //! wrong, and their clocks jump and stand still; the coordinator is frozen, its clock jumps, its disk is full, its
 //! machine crashes and loses, tears and reorders whatever was not synced; jobs wait for others, and users change
-//! their minds. However that goes, every job ends by itself, none begins before those that it waits for,
-//! every frame is whole and right, nothing acknowledged is rendered again, every lease ends and every queue is bounded.
+//! their minds; a polled site cannot be reached, its tasks are killed and their hosts gone, and a coordinator takes up what an
+//! earlier one left there. However that goes, every job ends by itself, none begins before those that it waits for,
+//! every frame is whole and right, nothing acknowledged is rendered or fetched again, every lease ends and every queue is bounded.
 //!
 //! A failure names its key and the smallest farm that fails with it; `replay` shows that again.
 //! Mistakes that are planted around the scheduler are all caught (`bugs`). `FLYBY_SIM_KEYS=10000` looks longer.
@@ -20,6 +21,7 @@ mod message;
 mod plan;
 mod random;
 mod run;
+mod site;
 mod user;
 mod witness;
 mod worker;
@@ -59,6 +61,26 @@ fn clocks_of_workers() {
     all(0..number_from("FLYBY_SIM_KEYS").unwrap_or(15), |key| {
         Plan::new(key, troubles)
     });
+}
+
+#[test]
+fn sites_that_are_polled() {
+    let troubles = Troubles {
+        aways: 100,
+        deaths: 100,
+        crashes: 15,
+        fulls: 10,
+        kills: 8,
+        cuts: 30,
+        ..Troubles::NONE
+    };
+    let report = all(0..number_from("FLYBY_SIM_KEYS").unwrap_or(40), |key| {
+        let plan = Plan::new(key, troubles);
+        let sites = 1 + key % 2;
+        Plan { sites, ..plan }
+    });
+    assert!(report.fetched > report.keys * 10, "{report:?}");
+    assert!(report.adopted > 0 && report.lost > 0, "{report:?}");
 }
 
 #[test]

@@ -29,6 +29,10 @@ pub(crate) struct Troubles {
     pub(crate) clocks: u64,
     /// In a second of the farm, a user wants something.
     pub(crate) wishes: u64,
+    /// In a second of the farm, a polled site cannot be reached for a while, longer than its patience or not.
+    pub(crate) aways: u64,
+    /// At a polled site, a task ends by itself after a block, or its host is gone.
+    pub(crate) deaths: u64,
     /// A tile fails.
     pub(crate) failures: u64,
     /// A worker makes wrong pixels.
@@ -51,6 +55,8 @@ impl Troubles {
         jumps: 0,
         clocks: 0,
         wishes: 0,
+        aways: 0,
+        deaths: 0,
         failures: 0,
         liars: 0,
         slow: 0,
@@ -70,6 +76,8 @@ impl Troubles {
         jumps: 2,
         clocks: 8,
         wishes: 30,
+        aways: 15,
+        deaths: 60,
         failures: 5,
         liars: 0,
         slow: 200,
@@ -77,7 +85,7 @@ impl Troubles {
 
     /// The same without each of them in turn.
     fn fewer(self) -> Vec<Self> {
-        let fields: [fn(&mut Self) -> &mut u64; 15] = [
+        let fields: [fn(&mut Self) -> &mut u64; 17] = [
             |it| &mut it.repeats,
             |it| &mut it.cuts,
             |it| &mut it.partitions,
@@ -90,6 +98,8 @@ impl Troubles {
             |it| &mut it.jumps,
             |it| &mut it.clocks,
             |it| &mut it.wishes,
+            |it| &mut it.aways,
+            |it| &mut it.deaths,
             |it| &mut it.failures,
             |it| &mut it.liars,
             |it| &mut it.slow,
@@ -119,6 +129,8 @@ pub(crate) enum Bug {
     UnboundedQueue,
     /// The scheduler is not told what a job waits for.
     NoPatience,
+    /// A polled site is not asked what of its tiles is missing.
+    FetchedAgain,
 }
 
 /// A farm.
@@ -126,6 +138,8 @@ pub(crate) enum Bug {
 pub(crate) struct Plan {
     pub(crate) key: u64,
     pub(crate) workers: u64,
+    /// Sites that are polled.
+    pub(crate) sites: u64,
     pub(crate) jobs: u64,
     /// Of the longest job.
     pub(crate) images: u64,
@@ -147,6 +161,8 @@ impl Plan {
             // In every second farm nothing may be rendered twice on purpose.
             verify: if key.is_multiple_of(2) { 0 } else { 30_000 },
             troubles,
+            // In every second farm nothing is polled.
+            sites: random.below(2),
             bug: None,
         }
     }
@@ -170,6 +186,10 @@ impl Plan {
         if self.workers > 1 {
             let workers = self.workers - 1;
             simpler.push(Self { workers, ..self });
+        }
+        if self.sites > 0 {
+            let sites = self.sites - 1;
+            simpler.push(Self { sites, ..self });
         }
         simpler
     }

@@ -21,6 +21,10 @@ pub(crate) struct Report {
     pub(crate) restarts: u64,
     /// Tiles that workers went on with after one.
     pub(crate) adopted: u64,
+    /// Blocks that were fetched from polled sites.
+    pub(crate) fetched: u64,
+    /// Times that a polled site was out of reach for longer than its patience.
+    pub(crate) lost: u64,
     /// Images that are rendered again since a worker made wrong pixels.
     pub(crate) convicted: u64,
 }
@@ -37,6 +41,8 @@ pub(crate) fn one(plan: Plan) -> Result<Report, String> {
             incidents: farm.coordinator.witness.incidents,
             restarts: farm.coordinator.restarts(),
             adopted: farm.coordinator.witness.adopted,
+            fetched: farm.coordinator.witness.fetched,
+            lost: farm.coordinator.witness.lost,
             convicted: farm.coordinator.witness.convicted,
         }
     };
@@ -106,6 +112,8 @@ impl Report {
         self.incidents += other.incidents;
         self.restarts += other.restarts;
         self.adopted += other.adopted;
+        self.fetched += other.fetched;
+        self.lost += other.lost;
         self.convicted += other.convicted;
     }
 }

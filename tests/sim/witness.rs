@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use model::{AttemptId, ImageRef, JobId, Lease, Rect, Span, Timestamp, WorkerId};
-use sched::{ImageState, JobOutcome, JobState, Sched};
+use sched::{BlockRef, ImageState, JobOutcome, JobState, Sched};
 use store::Recalled;
 
 use crate::disk::{HEIGHT, WIDTH};
@@ -28,11 +28,21 @@ pub(crate) struct Witness {
     pub(crate) convicted: u64,
     /// Tiles that workers went on with after a crash.
     pub(crate) adopted: u64,
+    /// Blocks that were fetched from polled sites.
+    pub(crate) fetched: u64,
+    /// Times that a polled site was out of reach for longer than its patience.
+    pub(crate) lost: u64,
     /// Pixels that were acknowledged and still count.
     pixels: BTreeMap<ImageRef, Vec<bool>>,
     /// Every lease of this epoch.
     leased: BTreeMap<AttemptId, (WorkerId, ImageRef)>,
     heard: BTreeMap<WorkerId, Timestamp>,
+    /// How long polled sites keep their tiles beyond that.
+    patience: BTreeMap<WorkerId, Span>,
+    /// Pixels that were acknowledged when a polled site was reached.
+    known: BTreeMap<WorkerId, BTreeMap<ImageRef, Vec<bool>>>,
+    /// Blocks of polled sites that were acknowledged.
+    brought: BTreeSet<(AttemptId, Rect)>,
     /// The scheduler before the last crash, where it had nothing to commit.
     pub(crate) before: Option<Sched>,
     placed: BTreeMap<(u64, ImageRef, u32), u32>,
@@ -52,6 +62,29 @@ impl Witness {
 
     pub(crate) fn hears_of(&mut self, worker: WorkerId, now: Timestamp) {
         self.heard.insert(worker, now);
+    }
+
+    /// A worker stands for a site that is polled.
+    pub(crate) fn is_patient(&mut self, worker: WorkerId, patience: Span) {
+        self.patience.insert(worker, patience);
+    }
+
+    /// A polled site is reached, and asks what is missing.
+    pub(crate) fn connects(&mut self, site: WorkerId) {
+        self.known.insert(site, self.pixels.clone());
+    }
+
+    /// A block is fetched from a polled site: it was missing when that was reached, and was not brought since.
+    pub(crate) fn fetches(&mut self, site: WorkerId, block: BlockRef) {
+        self.fetched += 1;
+        let known = self.known.get(&site);
+        let known = known.and_then(|known| known.get(&block.image));
+        let was_known = known.is_some_and(|pixels| places(block.rect).all(|place| pixels[place]));
+        let was_brought = self.brought.contains(&(block.attempt, block.rect));
+        assert!(
+            !was_known && !was_brought,
+            "{block:?}: what is durable is not fetched again"
+        );
     }
 
     pub(crate) fn leases(&mut self, worker: WorkerId, lease: &Lease) {
@@ -93,16 +126,20 @@ impl Witness {
         self.leased.get(&attempt).map(|&(_, image)| image)
     }
 
-    pub(crate) fn acknowledges(&mut self, image: ImageRef, rect: Rect) {
+    pub(crate) fn acknowledges(&mut self, worker: WorkerId, block: BlockRef) {
         let none = || vec![false; (WIDTH * HEIGHT) as usize];
-        let pixels = self.pixels.entry(image).or_insert_with(none);
-        for place in places(rect) {
-            pixels[place] = true;
+        let pixels = self.pixels.entry(block.image).or_insert_with(none);
+        places(block.rect).for_each(|place| pixels[place] = true);
+        if self.known.contains_key(&worker) {
+            self.brought.insert((block.attempt, block.rect));
         }
     }
 
     pub(crate) fn forget_pixels(&mut self, image: ImageRef) {
         self.pixels.remove(&image);
+        for known in self.known.values_mut() {
+            known.remove(&image);
+        }
     }
 
     pub(crate) fn forget_job(&mut self, job: JobId) {
@@ -131,8 +168,9 @@ impl Witness {
         for (&attempt, (worker, _)) in &self.leased {
             let heard = self.heard.get(worker).copied().unwrap_or_default();
             let is_over = sched.attempt(attempt).is_none();
+            let patience = self.patience.get(worker).copied().unwrap_or_default();
             assert!(
-                is_over || now - heard <= SILENCE_MAX,
+                is_over || now - heard <= SILENCE_MAX + patience,
                 "every lease ends: {attempt}"
             );
         }
@@ -142,6 +180,9 @@ impl Witness {
     pub(crate) fn crash(&mut self) {
         self.leased.clear();
         self.finished.clear();
+        self.known.clear();
+        self.brought.clear();
+        self.patience.clear();
     }
 
     /// Holds a scheduler that was told what the store recalls against what was promised.

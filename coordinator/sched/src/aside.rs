@@ -245,6 +245,11 @@ impl Sched {
         }
     }
 
+    /// Whether a worker's pixels were wrong, and its time is not over.
+    pub(crate) fn is_expelled(&self, worker: WorkerId) -> bool {
+        self.expelled.until(worker, self.now).is_some()
+    }
+
     /// Sees that a worker that was expelled, under this or an earlier incarnation, gets no tile.
     pub(crate) fn stays_expelled(&mut self, place: Place) {
         let worker = &mut self.workers[place];

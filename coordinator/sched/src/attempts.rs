@@ -6,7 +6,7 @@ use alloc::vec::Vec;
 
 use model::{AttemptId, ImageRef, WorkerId};
 
-use crate::attempt::Phase;
+use crate::attempt::{Attempt, Phase};
 use crate::roster::Place;
 use crate::timers::Timer;
 use crate::work::Reopened;
@@ -57,6 +57,19 @@ impl Sched {
                 attempt,
                 reason,
             });
+        }
+    }
+
+    /// Ends live attempts at a tile of which nothing is left to render. One that has delivered all it was leased for knows;
+    /// the others are told.
+    pub(crate) fn end_all(&mut self, live: impl Iterator<Item = u64>, out: &mut Vec<Effect>) {
+        for number in live {
+            let attempt = self.attempts.get(number);
+            if attempt.is_some_and(Attempt::is_delivered) {
+                self.end_attempt(number);
+            } else {
+                self.revoke(number, RevokeReason::TileDone, out);
+            }
         }
     }
 

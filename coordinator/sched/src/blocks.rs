@@ -1,17 +1,15 @@
 //! Blocks: what is durable counts, once.
 
-use alloc::boxed::Box;
 use alloc::vec::Vec;
 
 use model::{Digest, ImageRef, Rect, Span, Timestamp, WorkerId};
 
-use crate::attempt::Attempt;
-use crate::check::{Check, Made};
+use crate::check::Made;
 use crate::job::Job;
 use crate::leasing::Purpose;
 use crate::pace::cost_of;
-use crate::verify::is_drawn;
-use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, RevokeReason, Sched};
+use crate::verify::to_check;
+use crate::{BlockRef, BlockRefusal, Effect, ImageState, JobOutcome, Sched};
 
 /// A block that arrived, and what was found about it.
 struct Arrival {
@@ -23,24 +21,26 @@ struct Arrival {
     /// Why a block that was durable before was rendered again.
     purpose: Purpose,
     elapsed: Span,
-    pixels: Digest,
 }
 
 /// What a durable block added to its image.
-#[derive(Clone, Copy)]
+#[derive(Clone, Debug)]
 pub(crate) struct Added {
     /// Pixels that were not durable before.
     pub(crate) new: u64,
     /// Its tile, while that is leased.
     tile: Option<u32>,
     tile_is_done: bool,
+    /// Tiles that are done where it is part of none: its image was cut anew while it was written.
+    others_done: Vec<u32>,
     purpose: Purpose,
 }
 
 impl Added {
-    /// Its tile, where that is leased and nothing of it is left to render.
-    pub(crate) fn done_tile(self) -> Option<u32> {
-        self.tile.filter(|_| self.tile_is_done)
+    /// Tiles that are leased and of which nothing is left to render.
+    pub(crate) fn done_tiles(self) -> impl Iterator<Item = u32> {
+        let tile = self.tile.filter(|_| self.tile_is_done);
+        tile.into_iter().chain(self.others_done)
     }
 }
 
@@ -57,8 +57,12 @@ impl Job {
             new,
             tile: work.tile_of(rect),
             tile_is_done: false,
+            others_done: Vec::new(),
             purpose: Purpose::First,
         };
+        if !work.is_in_a_cell(rect) && new > 0 {
+            added.others_done = work.count_anew(rect);
+        }
         if let Some(tile) = added.tile.and_then(|tile| work.tiles.get_mut(tile)) {
             tile.missing -= new;
             added.tile_is_done = tile.missing == 0 && tile.check.is_none();
@@ -79,7 +83,7 @@ impl Job {
 
 /// Whose pixels of a block are durable.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
-enum Durable {
+pub(crate) enum Durable {
     /// Those that have just arrived, all of them.
     ByThis,
     /// Some that arrived before.
@@ -107,7 +111,10 @@ impl Sched {
         };
         let place = match self.place_of_block(block) {
             Ok(Some(place)) => place,
-            Ok(None) => return out.push(ack),
+            Ok(None) => {
+                self.has_part(worker, None, image);
+                return out.push(ack);
+            }
             Err(refusal) => {
                 return out.push(Effect::RefuseBlock {
                     worker,
@@ -122,16 +129,7 @@ impl Sched {
         let Some(added) = job.add_durable(place, rect, self.now) else {
             return;
         };
-        let Added {
-            new, tile, purpose, ..
-        } = added;
-        // Nobody is found to lie where nothing is verified.
-        if new > 0
-            && self.config.verify > 0
-            && let Some(work) = job.work.get_mut(&place)
-        {
-            work.makers.insert(worker);
-        }
+        let (new, tile, purpose) = (added.new, added.tile, added.purpose);
         // What an attempt delivered that nobody knows any more counts all the same.
         let is_recalled =
             attempt.epoch != self.config.epoch && !self.adopted.contains_key(&attempt);
@@ -145,10 +143,27 @@ impl Sched {
             new,
             purpose,
             elapsed,
-            pixels,
         };
-        self.credit_attempt(worker, &arrival, out);
-        if let Some(tile) = added.done_tile() {
+        let made = Made {
+            rect,
+            pixels,
+            by: worker,
+        };
+        let durable = match new == rect.area() {
+            true => Durable::ByThis,
+            false => Durable::Before,
+        };
+        let live = self.owned(worker, attempt);
+        self.has_part(worker, live, image);
+        let counts = match live {
+            Some(number) => self.credit_attempt(number, &arrival),
+            // Its attempt ended while it was written: what was let in counts for all that it would have counted for.
+            None => !is_recalled,
+        };
+        if counts {
+            self.hold_against_others(live, block, (made, durable), out);
+        }
+        for tile in added.done_tiles() {
             self.tile_done(image, tile, worker, out);
         }
         self.finish_image(image, out);
@@ -188,19 +203,16 @@ impl Sched {
         }
     }
 
-    /// Notes with its attempt and worker, where they are there, that a block arrived.
+    /// Notes with its attempt and worker that a block arrived, and says whether that is for the first time.
     /// One that is sent again counts once.
-    fn credit_attempt(&mut self, id: WorkerId, arrival: &Arrival, out: &mut Vec<Effect>) {
+    fn credit_attempt(&mut self, number: u64, arrival: &Arrival) -> bool {
         let BlockRef { image, rect, .. } = arrival.block;
-        let Some(number) = self.owned(id, arrival.block.attempt) else {
-            return;
-        };
         let Some(attempt) = self.attempts.get_mut(number) else {
-            return;
+            return false;
         };
         let fits = attempt.image == image && Some(attempt.tile) == arrival.tile;
         if !fits || !attempt.arrives(rect) {
-            return;
+            return false;
         }
         // A worker may claim any time; it cannot have taken longer than it had.
         let elapsed = arrival.elapsed.min(self.now - attempt.leased);
@@ -238,47 +250,10 @@ impl Sched {
         if !is_last {
             self.progress(number);
         }
-        let durable = match arrival.new == rect.area() {
-            true => Durable::ByThis,
-            false => Durable::Before,
-        };
-        let made = Made {
-            rect,
-            pixels: arrival.pixels,
-            by: id,
-        };
-        if self.is_check(number) {
-            self.checked(number, arrival.block, made, out);
-        } else if self.differs(number, made, durable) {
-            self.differed(number, arrival.block, made, out);
-        }
+        true
     }
 
-    /// Compares a block with what the other attempt at its tile made of it, if that is known.
-    fn differs(&mut self, number: u64, made: Made, durable: Durable) -> bool {
-        let verify = self.config.verify;
-        let attempt = &self.attempts[number];
-        let (image, tile) = (attempt.image, attempt.tile);
-        let Some((job, place)) = self.job_and_place(image) else {
-            return false;
-        };
-        let work = job.work.get_mut(&place);
-        let Some(tile) = work.and_then(|work| work.tiles.get_mut(tile)) else {
-            return false;
-        };
-        if let Some(first) = tile.evidence.first(made.rect) {
-            return first.pixels != made.pixels;
-        }
-        // Only while two are at work on it can there be another one to compare it with, or later.
-        let is_compared = tile.live_count() > 1 || is_drawn(verify, image, tile.region);
-        if is_compared && durable == Durable::ByThis {
-            tile.evidence.add_first(made);
-        }
-        false
-    }
-
-    /// Ends the attempts at a tile of which every pixel is durable. One that has
-    /// delivered all it was leased for knows; the others are told.
+    /// Ends the attempts at a tile of which every pixel is durable.
     pub(crate) fn tile_done(
         &mut self,
         image: ImageRef,
@@ -297,25 +272,9 @@ impl Sched {
             return;
         };
         let failed_on = core::mem::take(&mut done.trouble.failed_on);
-        let is_drawn = is_drawn(verify, image, done.region)
-            && done.evidence.firsts().len() == done.rect.blocks().count();
-        let is_doubted = verify > 0 && !done.evidence.dissents().is_empty();
-        if is_drawn || is_doubted {
-            let evidence = core::mem::take(&mut done.evidence);
-            done.check = Some(Box::new(Check::of(evidence)));
-        }
-        let live: [Option<u64>; 2] = {
-            let mut attempts = done.attempts();
-            [attempts.next(), attempts.next()]
-        };
-        for number in live.into_iter().flatten() {
-            let attempt = self.attempts.get(number);
-            if attempt.is_some_and(Attempt::is_delivered) {
-                self.end_attempt(number);
-            } else {
-                self.revoke(number, RevokeReason::TileDone, out);
-            }
-        }
+        done.check = to_check(verify, image, (done.region, done.rect), &mut done.evidence);
+        let live = done.attempts();
+        self.end_all(live, out);
         self.clear(by, image.job);
         if !failed_on.is_empty() {
             self.blame(image.job, &failed_on, by, out);

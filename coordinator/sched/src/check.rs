@@ -20,10 +20,10 @@ pub(crate) struct Made {
 ///
 /// Of most tiles nothing is kept, so that this is small where it is empty.
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-pub(crate) struct Evidence(Option<Box<Known>>);
+pub(crate) struct Evidence(Option<Box<Blocks>>);
 
 #[derive(Clone, PartialEq, Eq, Debug, Default)]
-struct Known {
+struct Blocks {
     /// As they are durable, where that may be compared with another rendering of them.
     first: Vec<Made>,
     /// What others made of some of those that differed.
@@ -71,7 +71,7 @@ impl Evidence {
             inside
         };
         let taken = self.0.as_mut().map(|known| {
-            Box::new(Known {
+            Box::new(Blocks {
                 first: take(&mut known.first),
                 dissent: take(&mut known.dissent),
             })
@@ -97,6 +97,19 @@ pub(crate) struct Check {
     unable: Vec<WorkerId>,
     /// Attempts at it that came to nothing.
     tries: u32,
+}
+
+/// What is known of the pixels of a block.
+pub(crate) enum Known<'a> {
+    /// Some of what is leased or waits with it is missing.
+    Evidence {
+        evidence: &'a mut Evidence,
+        region: Region,
+        /// How many render it.
+        live: usize,
+    },
+    /// All of it is durable, and it is rendered once more.
+    Check(&'a mut Check),
 }
 
 /// What a block says about who is right.
@@ -132,6 +145,12 @@ impl Check {
     /// rendered all of it, of whom each block has one or two, and those that could not.
     pub(crate) fn suits(&self, worker: WorkerId) -> bool {
         !self.unable.contains(&worker) && self.blocks_for(worker).next().is_some()
+    }
+
+    /// Whether a worker could be given all that is left of it.
+    pub(crate) fn suits_whole(&self, worker: WorkerId) -> bool {
+        let all = self.evidence.firsts().len();
+        !self.unable.contains(&worker) && self.blocks_for(worker).count() == all
     }
 
     /// The blocks that a worker rendered none of.

@@ -52,9 +52,11 @@ impl Sched {
                 }
             }
             if helped == HELPS_MAX || !self.help_to_end(out) {
-                return;
+                break;
             }
         }
+        // A check that was called back waits for whoever it was called back for.
+        self.unlooked.clear();
     }
 
     /// A worker that serves a kind of which a job has tiles, and the job that its next tile comes from.
@@ -119,7 +121,7 @@ impl Sched {
             .map(|aim| self.tile_by_time(job, (aim, left), speed));
         Some(Ask {
             worker: worker.id,
-            able: self.able_for(job),
+            able: self.able_beside_queues(job),
             most,
             fits,
             lasts: left.map(|left| cost_of(left + self.config.tile_time, speed)),
@@ -129,23 +131,16 @@ impl Sched {
 
     /// What a worker that stands for a queue should have of a job: every tile of an image is a cell.
     fn ask_of_queue(&self, worker: &Worker, queue: Queue, job: &Job) -> Ask {
-        let able = self.able_for(job);
-        let queues = self.queues.iter().filter(|&&place| {
-            let counts = self.workers[place].counted.as_ref();
-            counts.is_some_and(|counts| {
-                counts.kinds.contains(job.kind) && !counts.aside.contains(&job.id)
-            })
-        });
         Ask {
             worker: worker.id,
-            able,
+            able: self.able_for(job),
             most: None,
             fits: None,
             lasts: None,
             queue: Some(OfQueue {
                 grid: self.grid_for(queue, job.spec.window),
                 has_room: worker.has_room(),
-                is_last: queues.count() >= able as usize,
+                is_last: self.able_beside_queues(job) == 0,
             }),
         }
     }
@@ -170,6 +165,18 @@ impl Sched {
     /// Workers that take tiles of a job.
     pub(crate) fn able_for(&self, job: &Job) -> u32 {
         self.kinds.able(job.kind) - job.aside_able
+    }
+
+    /// Those that may have what others than a queue have begun: what failed on all of them waits for nobody else.
+    pub(crate) fn able_beside_queues(&self, job: &Job) -> u32 {
+        let queues = self.queues.iter().filter(|&&place| {
+            let counts = self.workers[place].counted.as_ref();
+            counts.is_some_and(|counts| {
+                counts.kinds.contains(job.kind) && !counts.aside.contains(&job.id)
+            })
+        });
+        let queues = u32::try_from(queues.count()).unwrap_or(u32::MAX);
+        self.able_for(job).saturating_sub(queues)
     }
 
     /// The speed of all threads of workers that take tiles.

@@ -23,6 +23,7 @@ mod attempts;
 mod blocks;
 mod check;
 mod command;
+mod compare;
 mod config;
 mod costs;
 mod demand;

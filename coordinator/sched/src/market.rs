@@ -39,6 +39,8 @@ pub(crate) struct Group {
     pub(crate) is_limited: bool,
     /// Who stands for a queue is like nobody else.
     pub(crate) queue: Option<Place>,
+    /// Whether they may hold another tile, or for a queue another image: one that may not wants the rest of those it holds.
+    pub(crate) has_room: bool,
 }
 
 /// Where a worker stands among those of its group that want tiles.

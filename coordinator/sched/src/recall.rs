@@ -67,7 +67,7 @@ impl Sched {
             if added.new > 0 {
                 job.recall_block(place, rect, elapsed);
             }
-            done.extend(added.done_tile());
+            done.extend(added.done_tiles());
         }
         for tile in done {
             self.tile_done(image, tile, NOBODY, out);

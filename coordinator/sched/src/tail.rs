@@ -3,7 +3,7 @@
 //! When a worker has a free thread and nothing waits for it, it takes over from the attempt that is
 //! expected to be done last: a lease that was not started is called back and leased to it; a
 //! tile that runs is leased to it a second time, from its other end, so that the two
-//! attempts meet. First result wins.
+//! attempts meet. First result wins. A check is helped as a tile is, by whoever could have done all that is left of it.
 //!
 //! Attempts are kept in the order in which they are expected to end, as of their lease. Only what
 //! this looks at is estimated anew: the last few, and those that should have ended already.
@@ -159,15 +159,21 @@ impl Sched {
         let job = self.jobs.get(&image.job)?;
         let work = job.work.get(&job.place(image.image)?)?;
         let tile = work.tiles.get(tile).filter(|_| !work.given_up)?;
-        if tile.check.is_some() {
-            return None;
-        }
-        let is_missing = |block: &Rect| !work.pixels.covers(*block);
-        let missing: Vec<Rect> = tile.rect.blocks().filter(is_missing).collect();
+        let worker = self.workers[place].id;
+        let missing: Vec<Rect> = match &tile.check {
+            Some(check) => check.blocks().collect(),
+            None => {
+                let is_missing = |block: &Rect| !work.pixels.covers(*block);
+                tile.rect.blocks().filter(is_missing).collect()
+            }
+        };
         let blocks = missing.len() as u64;
         let cost = job.costs.of_blocks(missing.into_iter())?;
-        let able = self.able_for(job);
-        let suits = tile.trouble.suits(self.workers[place].id, able);
+        let able = self.able_beside_queues(job);
+        let suits = match &tile.check {
+            Some(check) => check.suits_whole(worker),
+            None => tile.trouble.suits(worker, able),
+        };
         Some((cost, blocks, suits))
     }
 

@@ -9,19 +9,20 @@
 //! or have too little time left. Time in which its job is held up does not count. Like any lease it is cut down to what fits
 //! into the time that a worker has left, and what was found right is not rendered a third time.
 
+use alloc::boxed::Box;
 use alloc::collections::BTreeSet;
 use alloc::vec::Vec;
 
-use model::{ImageRef, JobId, Timestamp, WorkerId};
+use model::{ImageRef, JobId, Rect, Timestamp, WorkerId};
 
-use crate::check::{Check, Finding, Made, Waiting};
+use crate::check::{Check, Evidence, Waiting};
 use crate::job::Job;
 use crate::region::Region;
 use crate::tile::Tile;
 use crate::timers::Timer;
 use crate::work::Work;
 use crate::worker::Worker;
-use crate::{BlockRef, Effect, RevokeReason, Sched};
+use crate::{Effect, RevokeReason, Sched};
 
 /// Tiles of which [`crate::Config::verify`] are rendered once more.
 const OF: u64 = 1_000_000;
@@ -45,6 +46,19 @@ pub(crate) fn is_drawn(share: u32, image: ImageRef, region: Region) -> bool {
     hash % OF < u64::from(share)
 }
 
+/// What is to be rendered once more of pixels that are all durable, if anything is.
+pub(crate) fn to_check(
+    share: u32,
+    image: ImageRef,
+    (region, rect): (Region, Rect),
+    evidence: &mut Evidence,
+) -> Option<Box<Check>> {
+    let is_known = evidence.firsts().len() == rect.blocks().count();
+    let is_doubted = share > 0 && !evidence.dissents().is_empty();
+    let is_wanted = is_doubted || (is_known && is_drawn(share, image, region));
+    is_wanted.then(|| Box::new(Check::of(core::mem::take(evidence))))
+}
+
 impl Sched {
     /// Whether an attempt renders something once more.
     pub(crate) fn is_check(&mut self, number: u64) -> bool {
@@ -59,62 +73,30 @@ impl Sched {
         job.work.get_mut(&place)?.tiles.get_mut(tile)
     }
 
-    /// A block arrived of what is rendered once more.
-    pub(crate) fn checked(
-        &mut self,
-        number: u64,
-        block: BlockRef,
-        made: Made,
-        out: &mut Vec<Effect>,
-    ) {
-        let is_last = self.attempts[number].is_delivered();
-        let Some(check) = self
-            .checked_tile(number)
-            .and_then(|tile| tile.check.as_deref_mut())
-        else {
+    /// A worker's pixels of an image were written: whatever it made is rendered again should it be found to lie, or was before.
+    pub(crate) fn has_part(&mut self, worker: WorkerId, live: Option<u64>, image: ImageRef) {
+        // Nobody is found to lie where nothing is verified, and what is rendered once more is not written.
+        if self.config.verify == 0 || live.is_some_and(|number| self.is_check(number)) {
+            return;
+        }
+        let is_expelled = self.is_expelled(worker);
+        let Some((job, place)) = self.job_and_place(image) else {
             return;
         };
-        let job = block.image.job;
-        match check.finds(made) {
-            Finding::Nothing => {}
-            Finding::DissenterWrong { dissenter, first } => {
-                self.decided(job);
-                self.acquit(first, job);
-                self.convict(dissenter, out);
+        match job.work.get_mut(&place) {
+            Some(work) => {
+                work.makers.insert(worker);
+                work.given_up |= is_expelled;
             }
-            Finding::FirstWrong { dissenter, first } => {
-                self.report_incident(block, made.by, first, out);
-                self.decided(job);
-                // Its image is rendered again, all of it.
-                self.revoke(number, RevokeReason::RenderedAgain, out);
-                self.acquit(dissenter, job);
-                self.convict(first, out);
-                return;
-            }
-            Finding::Doubt { first } => {
-                let by = check.makers();
-                self.report_incident(block, made.by, first, out);
-                self.revoke(number, RevokeReason::Differs, out);
-                if self.has_another(job, &by) {
-                    self.doubt(first, job, out);
-                    self.doubt(made.by, job, out);
-                }
-                return;
-            }
-            Finding::Everybody => {
-                self.report_incident(block, made.by, made.by, out);
-                let reason = "three workers made three different pixels of one block: a machine or a renderer is at fault";
-                self.give_up(block.image, reason.into(), out);
-                return;
-            }
+            None => job.remember_maker(place, worker),
         }
-        if is_last {
-            self.check_ends(number, made.by, out);
+        if is_expelled {
+            self.wrong.add(image, worker);
         }
     }
 
     /// A worker has delivered all that it was to render once more.
-    fn check_ends(&mut self, number: u64, by: WorkerId, out: &mut Vec<Effect>) {
+    pub(crate) fn check_ends(&mut self, number: u64, by: WorkerId, out: &mut Vec<Effect>) {
         let tile = self.checked_tile(number);
         let check = tile.and_then(|tile| tile.check.as_deref());
         match check.is_some_and(|check| check.suits(by)) {
@@ -144,7 +126,8 @@ impl Sched {
         if let Some(tile) = self.checked_tile(number)
             && let Some(mut check) = tile.check.take()
         {
-            match check.fails(by) >= max {
+            let is_alone = tile.live_count() == 1;
+            match check.fails(by) >= max && is_alone {
                 true => given_up = Some(*check),
                 false => tile.check = Some(check),
             }
@@ -156,66 +139,8 @@ impl Sched {
         }
     }
 
-    pub(crate) fn report_incident(
-        &mut self,
-        block: BlockRef,
-        worker: WorkerId,
-        other: WorkerId,
-        out: &mut Vec<Effect>,
-    ) {
-        if let Some(job) = self.jobs.get_mut(&block.image.job) {
-            job.tally.incidents += 1;
-            job.tally.undecided += 1;
-        }
-        let other = Some(other).filter(|&other| other != worker);
-        out.push(Effect::Incident {
-            block,
-            worker,
-            other,
-        });
-    }
-
-    /// It is known who was right about a block. What else is doubted of its image goes with that, where it is rendered again.
-    fn decided(&mut self, job: JobId) {
-        if let Some(job) = self.jobs.get_mut(&job) {
-            job.tally.undecided = job.tally.undecided.saturating_sub(1);
-        }
-    }
-
-    /// Two attempts at a tile made different pixels of a block: the later one ends, and a third decides where there is one.
-    pub(crate) fn differed(
-        &mut self,
-        number: u64,
-        block: BlockRef,
-        made: Made,
-        out: &mut Vec<Effect>,
-    ) {
-        let (place, job) = (self.attempts[number].worker, block.image.job);
-        let mut first = made.by;
-        if let Some(tile) = self.checked_tile(number) {
-            first = tile.evidence.first(made.rect).map_or(first, |made| made.by);
-            tile.evidence.add_dissent(made);
-        }
-        self.report_incident(block, made.by, first, out);
-        self.revoke(number, RevokeReason::Differs, out);
-        self.charge_fault(place, job, out);
-        if self.config.verify > 0 && self.has_another(job, &[made.by, first]) {
-            self.doubt(first, job, out);
-            self.doubt(made.by, job, out);
-        }
-    }
-
-    /// Whether somebody else could render now what these did.
-    fn has_another(&self, job: JobId, by: &[WorkerId]) -> bool {
-        let Some(job) = self.jobs.get(&job) else {
-            return false;
-        };
-        let mut workers = self.workers.iter();
-        workers.any(|(_, worker)| takes_now(worker, job) && !by.contains(&worker.id))
-    }
-
     /// A worker's pixels were wrong: nothing that it made is believed.
-    fn convict(&mut self, worker: WorkerId, out: &mut Vec<Effect>) {
+    pub(crate) fn convict(&mut self, worker: WorkerId, out: &mut Vec<Effect>) {
         self.expel(worker, out);
         let place = self.workers.place(worker);
         let live = place.map_or_else(Vec::new, |place| self.workers[place].live.clone());
@@ -329,7 +254,7 @@ impl Sched {
     fn may_do(&self, job: &Job, work: &Work, waiting: &Waiting) -> bool {
         let mut workers = self.workers.iter();
         workers.any(|(_, worker)| {
-            takes_now(worker, job)
+            checks_now(worker, job)
                 && waiting.check.suits(worker.id)
                 && self
                     .ask(worker, job)
@@ -374,15 +299,19 @@ impl Sched {
     }
 }
 
-/// Whether a worker takes tiles of a job at this moment.
-fn takes_now(worker: &Worker, job: &Job) -> bool {
-    worker.is_able() && worker.kinds.contains(job.kind) && worker.aside.job(job.id).is_none()
+/// Whether a worker renders something of a job once more where that is asked at this moment.
+pub(crate) fn checks_now(worker: &Worker, job: &Job) -> bool {
+    checks(worker, job) && worker.is_able() && worker.aside.job(job.id).is_none()
 }
 
 /// Whether a worker may do a check some time, if it is not lost before.
 fn could_ever(worker: &Worker, job: &Job, check: &Check) -> bool {
-    let serves = worker.kinds.contains(job.kind) && worker.aside.expelled().is_none();
-    serves && check.suits(worker.id)
+    checks(worker, job) && worker.aside.expelled().is_none() && check.suits(worker.id)
+}
+
+/// Whether a worker is of those that do checks of a job: a queue takes whole images.
+fn checks(worker: &Worker, job: &Job) -> bool {
+    worker.kinds.contains(job.kind) && worker.offer.queue.is_none()
 }
 
 impl Job {
@@ -402,6 +331,20 @@ impl Job {
             && let Some((_, forgotten)) = self.makers.pop_first()
         {
             self.makers_count -= forgotten.len();
+        }
+    }
+
+    /// Remembers of one more that it rendered some of an image.
+    fn remember_maker(&mut self, place: u32, worker: WorkerId) {
+        let mut makers: BTreeSet<WorkerId> = self
+            .makers
+            .get(&place)
+            .into_iter()
+            .flatten()
+            .copied()
+            .collect();
+        if makers.insert(worker) {
+            self.remember_makers(place, makers);
         }
     }
 

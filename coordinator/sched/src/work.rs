@@ -12,7 +12,8 @@ use core::cmp::Reverse;
 
 use model::{Rect, Timestamp, WorkerId};
 
-use crate::check::{Checks, Evidence, Waiting};
+use crate::attempt::is_block_of;
+use crate::check::{Check, Checks, Evidence, Known, Waiting};
 use crate::costs::{CostMap, scale};
 use crate::pixels::PixelsDone;
 use crate::region::Region;
@@ -226,9 +227,10 @@ impl Work {
         self.queue = Some(queue);
     }
 
-    /// Cuts it anew, where nobody holds a tile of it.
+    /// Cuts it anew, where nobody holds a tile of it and nothing is to be known of what they made.
     pub(crate) fn cut_anew(&mut self, grid: TileGrid, map: Option<Arc<CostMap>>) {
-        if self.grid != grid && self.tiles.is_empty() {
+        let is_free = self.tiles.is_empty() && self.checks.is_empty() && !self.given_up;
+        if self.grid != grid && is_free {
             let pixels = core::mem::replace(&mut self.pixels, PixelsDone::none(grid.window()));
             let (spent, makers) = (self.spent, core::mem::take(&mut self.makers));
             *self = Self {
@@ -519,11 +521,7 @@ impl Work {
                 evidence,
             });
         } else if let Some(check) = tile.check.filter(|check| !check.is_done()) {
-            self.checks.push_back(Waiting {
-                region,
-                check: *check,
-                since: now,
-            });
+            self.put_check(region, *check, now);
             return Reopened::Checks;
         }
         Reopened::Plain
@@ -587,6 +585,93 @@ impl Work {
         let cell = self.grid.index_of(block)?;
         let tile = self.cells[cell as usize];
         (tile != NO_TILE).then_some(tile)
+    }
+
+    /// Whether pixels are part of one cell: those of a block are, unless the image was cut anew since.
+    pub(crate) fn is_in_a_cell(&self, block: Rect) -> bool {
+        self.grid.index_of(block).is_some()
+    }
+
+    /// Counts anew what is missing of the tiles around some pixels; those of which nothing is.
+    pub(crate) fn count_anew(&mut self, rect: Rect) -> Vec<u32> {
+        let tiles = self.tiles.iter();
+        let touched = tiles.filter(|(_, tile)| tile.rect.intersection(rect).is_some());
+        let missing = touched.map(|(number, tile)| (number, self.missing(tile.rect)));
+        let missing: Vec<(u32, u64)> = missing.collect();
+        let mut done = Vec::new();
+        for (number, missing) in missing {
+            if let Some(tile) = self.tiles.get_mut(number) {
+                let was_missing = core::mem::replace(&mut tile.missing, missing);
+                if missing == 0 && was_missing > 0 {
+                    done.push(number);
+                }
+            }
+        }
+        done
+    }
+
+    /// What is known of a block's pixels, wherever it is; nothing where it is no block as the image is cut now.
+    pub(crate) fn known_of(&mut self, block: Rect) -> Option<Known<'_>> {
+        let cell = self.grid.tile(self.grid.index_of(block)?);
+        if !is_block_of(cell, block) {
+            return None;
+        }
+        if let Some(tile) = self.tile_of(block) {
+            let tile = self.tiles.get_mut(tile)?;
+            let live = tile.live_count();
+            return Some(match &mut tile.check {
+                Some(check) => Known::Check(check),
+                None => Known::Evidence {
+                    evidence: &mut tile.evidence,
+                    region: tile.region,
+                    live,
+                },
+            });
+        }
+        let grid = self.grid;
+        let holds = |region: Region| region.rect(grid).contains(block);
+        let mut waiting = self.checks.iter_mut();
+        if let Some(waiting) = waiting.find(|waiting| holds(waiting.region)) {
+            return Some(Known::Check(&mut waiting.check));
+        }
+        let mut pieces = self.pieces.values_mut().chain(&mut self.troubled);
+        let piece = pieces.find(|piece| holds(piece.region))?;
+        Some(Known::Evidence {
+            evidence: &mut piece.evidence,
+            region: piece.region,
+            live: 0,
+        })
+    }
+
+    /// Lets go of the piece around a block where nothing of it is missing; its pixels, and what was made of them.
+    pub(crate) fn take_whole(&mut self, block: Rect) -> Option<(Region, Rect, Evidence)> {
+        let grid = self.grid;
+        let is_whole = |piece: &Piece| {
+            let rect = piece.region.rect(grid);
+            rect.contains(block) && self.missing(rect) == 0
+        };
+        let plain = self.pieces.iter().find(|(_, piece)| is_whole(piece));
+        let plain = plain.map(|(&order, _)| order);
+        let piece = match plain {
+            Some(order) => self.pieces.remove(&order),
+            None => {
+                let index = self.troubled.iter().position(is_whole)?;
+                self.troubled.remove(index)
+            }
+        }?;
+        let amount = self.amount(piece.region);
+        self.open.pixels -= amount.pixels;
+        self.open.cost -= amount.cost;
+        Some((piece.region, piece.region.rect(grid), piece.evidence))
+    }
+
+    /// Has pixels that are all durable wait to be rendered once more.
+    pub(crate) fn put_check(&mut self, region: Region, check: Check, now: Timestamp) {
+        self.checks.push_back(Waiting {
+            region,
+            check,
+            since: now,
+        });
     }
 
     /// The blocks of a tile that a worker is to render, in order; empty where all are.

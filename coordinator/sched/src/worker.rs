@@ -159,6 +159,7 @@ impl Worker {
                 aside: self.aside.jobs(),
                 is_limited: self.ends.is_some(),
                 queue: self.offer.queue.map(|_| place),
+                has_room: self.has_room(),
             };
             (group, seat)
         })

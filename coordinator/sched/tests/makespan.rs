@@ -363,3 +363,11 @@ fn what_is_done_about_the_end_of_a_job_is_worth_it() {
         "{all} {helped} {alone} {plain}"
     );
 }
+
+#[test]
+#[ignore = "long: tests/run --all"]
+fn checks_that_are_slow_are_helped_as_tiles_are() {
+    // Everything is rendered once more, and that is twice the work.
+    let ratio = makespan("verified", TIME, |config| config.verify = 1_000_000) / 2.0;
+    assert!(ratio <= 1.035, "{ratio}");
+}

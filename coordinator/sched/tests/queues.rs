@@ -9,7 +9,10 @@ use sched::{
     BlockRef, Effect, Event, ImageState, LinkId, Offer, Queue, RevokeReason, Submission, TileShape,
     Verdict, WhyWorker,
 };
-use situation::{EPOCH, Farm, farm, forget, image_ref, offer, state, submission, worker};
+use situation::{
+    EPOCH, Farm, encode, farm, forget, image_ref, makes, offer, state, submission, suspicious,
+    unverified, worker,
+};
 
 const SITE: u64 = 1;
 const LOCAL: u64 = 2;
@@ -328,6 +331,44 @@ fn its_tiles_outlive_the_coordinator() {
         store(&mut farm, SITE, (old(7), 0), rect);
     }
     assert_eq!(farm.sched.image(image_ref(0)).unwrap().pixels_done, 10_000);
+}
+
+#[test]
+fn who_wants_more_images_gets_them_at_once() {
+    let mut farm = farm();
+    job(&mut farm, 4);
+    site(&mut farm, SNOWDON, 1);
+    assert_eq!(leases(&mut farm, SITE).keys().collect::<Vec<_>>(), [&0]);
+    farm.wants_tiles(SITE, 3);
+    let more = leases(&mut farm, SITE);
+    assert_eq!(more.keys().collect::<Vec<_>>(), [&1, &2]);
+}
+
+#[test]
+fn what_failed_where_it_was_begun_does_not_wait_for_a_queue() {
+    let mut farm = farm();
+    farm.job(1).worker(LOCAL, 2);
+    comes(&mut farm, SNOWDON, &[]);
+    farm.wants_tiles(SITE, 1).never_mind();
+    farm.fails(LOCAL, 1);
+    // It was cut for nobody else, and who began it tries again once it says that it has room.
+    let again = leases(&mut farm, LOCAL);
+    assert_eq!(again[&0].len(), 1);
+}
+
+#[test]
+fn nobody_waits_for_a_queue_to_check_anything() {
+    let mut farm = suspicious();
+    farm.job(1).worker(LOCAL, 2);
+    comes(&mut farm, SNOWDON, &[]);
+    farm.never_mind();
+    makes(&mut farm, (LOCAL, 1), 0, 0, 7);
+    makes(&mut farm, (LOCAL, 2), 0, 1, 7);
+    let effects = farm.never_mind();
+    assert!(
+        effects.ends_with(&[unverified(0, 2), encode(0)]),
+        "{effects:?}"
+    );
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What the scheduler wants: done in order, after what it waits for is committed.
 
 use model::{Epoch, ImageRef, Span, Timestamp};
-use sched::{Command, Effect, Event, ImageState, JobOutcome, JobState};
+use sched::{BlockRef, Command, Effect, Event, ImageState, JobOutcome, JobState};
 use session::{BlockVerdict, Retry, Welcome};
 
 use super::writer::Order;
@@ -71,7 +71,12 @@ impl Coordinator {
                 rect,
             } => {
                 if let Some((image, _)) = about.filter(|&(image, era)| era == self.era(image)) {
-                    self.witness.acknowledges(image, rect);
+                    let block = BlockRef {
+                        attempt,
+                        image,
+                        rect,
+                    };
+                    self.witness.acknowledges(worker, block);
                 }
                 (worker, Down::Ack(attempt, rect))
             }

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use model::{Span, Timestamp, WorkerId};
-use sched::{BlockRef, Event, LinkId, Offer, Verdict};
+use sched::{BlockRef, Event, LinkId, Offer, Queue, Verdict};
 use session::BlockVerdict;
 
 use super::writer::{BLOCKS_MAX, Order};
@@ -12,6 +12,18 @@ use crate::disk::Pixels;
 use crate::message::{Down, Up};
 use crate::plan::Bug;
 
+/// What whoever says hello offers.
+pub(crate) fn offer(queue: Option<Queue>) -> Offer {
+    Offer {
+        revision: REVISION,
+        threads: 1,
+        memory_bytes: 0,
+        labels: BTreeSet::new(),
+        time_left: None,
+        queue,
+    }
+}
+
 impl Coordinator {
     pub(crate) fn hears(&mut self, now: Timestamp, worker: WorkerId, link: u64, message: Up) {
         self.witness.hears_of(worker, now);
@@ -19,14 +31,7 @@ impl Coordinator {
             Up::Hello(held, begun) => Event::WorkerJoined {
                 worker,
                 link: LinkId(link),
-                offer: Offer {
-                    revision: REVISION,
-                    threads: 1,
-                    memory_bytes: 0,
-                    labels: BTreeSet::new(),
-                    time_left: None,
-                    queue: None,
-                },
+                offer: offer(None),
                 held,
                 begun,
             },

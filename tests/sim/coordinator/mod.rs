@@ -21,6 +21,7 @@ use crate::message::Down;
 use crate::plan::{Bug, Plan};
 use crate::witness::Witness;
 use effects::Held;
+pub(crate) use inputs::offer;
 use writer::{Group, Order};
 
 pub(crate) const REVISION: Revision = Revision(1);
@@ -51,7 +52,7 @@ pub(crate) struct Coordinator {
     pub(crate) disk: Disk,
     store: Memory,
     pub(crate) witness: Witness,
-    plan: Plan,
+    pub(crate) plan: Plan,
     epoch: u64,
     pub(crate) is_up: bool,
     /// How far its clock is ahead of the world's.

@@ -12,7 +12,7 @@ pub(super) struct Tile {
     /// Blocks that have arrived, those that were there before it was taken up among them.
     pub(super) arrived: u32,
     pub(super) inherited: u32,
-    /// Blocks that were durable when it was taken up, and may lie in its file all the same.
+    /// Blocks that were durable at some hello, and may lie in its file all the same.
     pub(super) found: Vec<Rect>,
     /// How long they took one thread.
     pub(super) took: Span,
@@ -69,9 +69,10 @@ impl Tile {
 
     /// Only these blocks are still wanted of it.
     pub(super) fn lacks(&mut self, missing: &BTreeSet<Rect>) {
-        self.found = self.missing.difference(missing).copied().collect();
+        let found: Vec<Rect> = self.missing.difference(missing).copied().collect();
         self.missing.retain(|block| missing.contains(block));
-        let found = u32::try_from(self.found.len()).unwrap_or(u32::MAX);
+        self.found.extend(&found);
+        let found = u32::try_from(found.len()).unwrap_or(u32::MAX);
         self.inherited += found;
         self.arrived += found;
     }

@@ -316,6 +316,22 @@ fn what_is_durable_already_is_not_fetched_again() {
 }
 
 #[test]
+fn what_was_durable_at_one_hello_is_not_fetched_after_the_next() {
+    let mut there = there();
+    there.poll.leased(lease(0, 0));
+    there.submits();
+    there.are(Stands::Runs);
+    there.looks();
+    let blocks: Vec<Rect> = lease(0, 0).tile.blocks().collect();
+    // Nothing was fetched between the two.
+    for _ in 0..2 {
+        there.poll.lacks(attempt(0), &blocks[1..]);
+        let wants = there.poll.wants().remove(0);
+        assert_eq!(wants.but, [vec![edges(blocks[0])]]);
+    }
+}
+
+#[test]
 fn a_task_whose_host_is_gone_is_given_back_by_nobody_s_fault() {
     let mut there = there();
     for round in 0..5_u64 {
