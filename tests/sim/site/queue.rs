@@ -156,6 +156,7 @@ impl Queue {
         let seen = Seen {
             arrays: arrays.collect(),
             files: Vec::new(),
+            full: None,
         };
         let mut fetched = Vec::new();
         for wants in wants {
