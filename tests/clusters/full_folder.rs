@@ -25,13 +25,15 @@ fn here(min_tile_pixels: u32) -> Option<(SmallDisk, Flight)> {
     Some((disk, flight))
 }
 
-/// The site's trouble names folder and host, and what to do.
+/// The site's trouble names folder and host, and what to do; also where what is fetched and removed there made room meanwhile.
 #[track_caller]
-fn says_so(flight: &Flight) {
+fn says_so(flight: &Flight, disk: &SmallDisk) {
     let there = flight.farm.place.path("there");
     let folder = format!("the folder {}/farm-", there.display());
     let words: [&str; 3] = [&folder, "on this machine is full", "make room there"];
+    disk.fill();
     flight.wait_trouble(&words);
+    disk.fill();
     let check = ["site", "check", "test", "--sites", "sites.toml"];
     let check = flight.farm.place.flyby(check);
     let says = |word: &&str| check.stdout.contains(*word);
@@ -40,7 +42,7 @@ fn says_so(flight: &Flight) {
 
 /// However often the site is looked at.
 #[track_caller]
-fn submits_nothing(flight: &Flight) {
+fn submits_nothing(flight: &Flight, disk: &SmallDisk) {
     let submitted = || {
         let said = flight.farm.coordinator.stderr();
         said.matches("an array is submitted").count()
@@ -48,6 +50,7 @@ fn submits_nothing(flight: &Flight) {
     let before = submitted();
     let mut looks = BTreeSet::new();
     wait::until("the site is looked at several times", || {
+        disk.fill();
         looks.insert(flight.count("asked_unix_ms"));
         (looks.len() > LOOKS).then_some(())
     });
@@ -61,8 +64,8 @@ fn full_when_a_job_is_submitted_others_render_it_and_with_room_the_site_does() {
     };
     disk.fill();
     let job = flight.farm.submit(&small().with(&[FLYBY]));
-    says_so(&flight);
-    submits_nothing(&flight);
+    says_so(&flight, &disk);
+    submits_nothing(&flight, &disk);
     let worker = flight.farm.worker(&["--threads", "1"]);
     let done = flight.farm.wait_done(job);
     assert_eq!(done.film_digests(), small().digests);
@@ -89,9 +92,8 @@ fn full_while_a_task_runs_fails_nothing_and_no_block_comes_twice() {
     };
     let job = flight.farm.submit(&slow().with(&[FLYBY]));
     flight.farm.wait_acknowledged(job, 1);
-    disk.fill();
-    says_so(&flight);
-    submits_nothing(&flight);
+    says_so(&flight, &disk);
+    submits_nothing(&flight, &disk);
     assert_eq!(flight.farm.job(job).state(), "running");
     disk.empty();
     let done = flight.farm.wait_done(job);
