@@ -4,6 +4,7 @@
 //! FARM/run/NAME/count, script, boot     of an array
 //! FARM/run/NAME/PID.runner              who takes tasks; as many as may run at a time
 //! FARM/run/NAME/TASK.claim, .pid, .exit, .deleted
+//! FARM/run/slot.NUMBER                  locks: of arrays with a limit no more tasks run at a time than it says, together
 //! ```
 //!
 //! A process counts as ours where its number, its start time and the boot of its machine are those that were written
@@ -133,6 +134,9 @@ fn start(folder: &str, array: &Array, script: &str) -> String {
         .running_max
         .unwrap_or(array.tasks)
         .clamp(1, array.tasks.max(1));
+    let slots = array
+        .running_max
+        .map_or(String::new(), |most| most.to_string());
     let log = quote_path(&array.log);
     let mut text = format!(
         "set -e; umask 077; d={folder}/{name}; log={log}; mkdir -p {folder} \"$(dirname \"$log\")\"\n\
@@ -154,7 +158,7 @@ fn start(folder: &str, array: &Array, script: &str) -> String {
     let _ = write!(
         text,
         "mv \"$t\" \"$d\"\ni=0\nwhile [ $i -lt {runners} ]; do i=$((i + 1))\n\
-         setsid sh \"$d/runner\" \"$d\" \"$log\" </dev/null >/dev/null 2>&1 &\ndone\n\
+         setsid sh \"$d/runner\" \"$d\" \"$log\" $i {slots} </dev/null >/dev/null 2>&1 &\ndone\n\
          gone=\n\
          while ! ls \"$d\"/*.runner >/dev/null 2>&1 && [ ! -e \"$d/1.exit\" ]; do\n\
          if [ -n \"$gone\" ]; then cp \"$d/script\" \"$d/again\" || :; rm -rf \"$d\"; echo 'nobody stayed to take tasks' >&2; exit 1; fi\n\

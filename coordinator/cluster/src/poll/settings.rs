@@ -17,7 +17,7 @@ pub struct Settings {
     pub revision: Revision,
     /// Render threads of a task.
     pub threads: u32,
-    /// Most tasks of an array that run at a time, where the queue does not see to that.
+    /// Most tasks of an array that run at a time; on hosts without a queue, of all arrays.
     pub running_max: Option<u32>,
     /// Most tasks of an array.
     pub array_max: u32,

@@ -133,6 +133,34 @@ fn no_more_run_than_may() {
 }
 
 #[test]
+fn no_more_of_all_arrays_run_than_may() {
+    let host = Host::new();
+    // Who finds another at work says so; each takes long enough to be found.
+    let alone = host.folder.path().join("alone");
+    let script = format!(
+        "mkdir '{0}' || exit 1; i=0; while [ $i -lt 20 ]; do i=$((i + 1)); sleep 0.05; done; rmdir '{0}'",
+        alone.display()
+    );
+    for (name, tasks) in [("flyby-1", 2), ("flyby-2", 1), ("flyby-3", 1)] {
+        let array = host.array(name, tasks, Some(1), &script);
+        host.queue.submit(&array).unwrap();
+    }
+    // Nobody who waits for what is deleted stays.
+    host.queue.delete(&[TaskId::whole("flyby-2")]).unwrap();
+    let states = host.wait("they end", |states| !states.iter().any(TaskState::is_live));
+    let deleted = TaskState::Deleted;
+    assert_eq!(
+        states,
+        [TaskState::Done, TaskState::Done, deleted, TaskState::Done]
+    );
+    let gone = host.folder.path().join("a farm/run/flyby-2");
+    host.wait("who took its tasks ends", |_| {
+        let mut files = std::fs::read_dir(&gone).unwrap().flatten();
+        !files.any(|file| file.file_name().to_string_lossy().ends_with(".runner"))
+    });
+}
+
+#[test]
 fn what_is_deleted_ends_with_all_it_started() {
     let host = Host::new();
     let script =

@@ -36,7 +36,8 @@ pub struct Site {
     pub min_tile_pixels: u64,
     /// Most tasks of one array; the queue's own limit holds besides.
     pub max_array_size: Option<u32>,
-    /// Most allocations that run at a time, as far as the user or the queue (`maxujobs`) allows; `None`: no limit.
+    /// Most allocations that run at a time, as far as the user or the queue (`maxujobs`) allows; `None`: no limit. Polled, tasks: of
+    /// all arrays on hosts without a queue, of each in a queue, whose own limits hold for all.
     pub max_running: Option<u32>,
     /// How often the queue is asked.
     #[serde(with = "microseconds")]
