@@ -230,9 +230,15 @@ impl Pilot {
     }
 
     /// Looks at what the queue shows of ours, and says what to do. Actions are done in order.
+    ///
+    /// Where it is to be asked what became of some, that is all: it decides whether others take their place, and so this is asked
+    /// again afterwards.
     pub fn observe(&mut self, now: Timestamp, shown: &[Task], wanted: Wanted) -> Vec<Action> {
         self.wanted = wanted;
-        let mut actions = self.follow(now, shown);
+        if let Some(asked) = self.follow(now, shown) {
+            return vec![asked];
+        }
+        let mut actions = Vec::new();
         let has_ended = std::mem::take(&mut self.has_ended);
         self.barren = match wanted.squares > 0 && wanted.unmeasured == wanted.squares {
             true => self.barren.saturating_add(u32::from(has_ended)),
@@ -257,7 +263,8 @@ impl Pilot {
         }
         let live = waiting.saturating_add(running);
         if live < target {
-            actions.extend(self.submit(now, target - live));
+            let missing = (target - live).saturating_sub(self.unexplained(shown));
+            actions.extend(self.submit(now, missing));
         } else {
             // What is wanted goes up and down a little; all of it goes where nothing is left to do.
             let slack = if target == 0 { 0 } else { self.settings.ahead };
@@ -311,7 +318,7 @@ impl Pilot {
     }
 
     /// Notes what has ended; asks for what the queue shows no more.
-    fn follow(&mut self, now: Timestamp, shown: &[Task]) -> Vec<Action> {
+    fn follow(&mut self, now: Timestamp, shown: &[Task]) -> Option<Action> {
         let mut states: BTreeMap<&TaskId, &Task> = BTreeMap::new();
         for task in shown {
             states.insert(&task.id, task);
@@ -342,10 +349,7 @@ impl Pilot {
             self.end(now, task);
         }
         let missing: Vec<TaskId> = missing.into_iter().take(LOOKED_UP_MAX).collect();
-        match missing.is_empty() {
-            true => Vec::new(),
-            false => vec![Action::LookUp(missing)],
-        }
+        (!missing.is_empty()).then_some(Action::LookUp(missing))
     }
 
     fn end(&mut self, now: Timestamp, task: &Task) {
@@ -417,8 +421,16 @@ impl Pilot {
         }
     }
 
+    /// Allocations that are being ended, where their deletion would stop the site: none takes their place before that is known.
+    /// Elsewhere they are not waited for, since on a host that is gone that may take long.
+    fn unexplained(&self, shown: &[Task]) -> u32 {
+        let waits = self.settings.cancelled == Cancelled::Stop;
+        let ending = |task: &&Task| waits && task.state == TaskState::Ending;
+        u32::try_from(shown.iter().filter(ending).count()).unwrap_or(u32::MAX)
+    }
+
     fn submit(&mut self, now: Timestamp, tasks: u32) -> Option<Action> {
-        if self.stopped || now < self.quiet_until {
+        if tasks == 0 || self.stopped || now < self.quiet_until {
             return None;
         }
         // After a failure one shows whether it is over.

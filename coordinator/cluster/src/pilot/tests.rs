@@ -158,8 +158,9 @@ fn one_that_the_queue_shows_no_more_is_asked_for_and_replaced() {
     shown.pop();
     let asked = [TaskId::whole("7")];
     let actions = pilot.observe(NOW, &shown, PLENTY);
-    assert_eq!(actions, [Action::LookUp(asked.to_vec()), submit(2, 1)]);
+    assert_eq!(actions, [Action::LookUp(asked.to_vec())]);
     pilot.have_ended(NOW, &asked, &[]);
+    assert_eq!(pilot.observe(NOW, &shown, PLENTY), [submit(2, 1)]);
     pilot.submitted(&TaskId::whole("8"), 1);
     shown.push(Task {
         id: TaskId::task("8", 1),
@@ -260,6 +261,32 @@ fn what_somebody_else_deleted_is_replaced_after_a_while_or_not_at_all() {
             .unwrap()
             .contains("cancelled = \"stop\"")
     );
+}
+
+#[test]
+fn none_takes_the_place_of_one_that_may_stop_the_site_before_it_is_known_how_it_ended() {
+    for is_shown in [true, false] {
+        let (mut pilot, mut shown) = running();
+        pilot.settings.cancelled = Cancelled::Stop;
+        shown[2].state = TaskState::Ending;
+        assert_eq!(pilot.observe(NOW, &shown, PLENTY), []);
+        let mut gone = shown.pop().unwrap();
+        gone.state = TaskState::Deleted;
+        if is_shown {
+            shown.push(gone);
+        } else {
+            let asked = [TaskId::whole("7")];
+            let actions = pilot.observe(NOW, &shown, PLENTY);
+            assert_eq!(actions, [Action::LookUp(asked.to_vec())]);
+            pilot.have_ended(NOW, &asked, &[gone]);
+        }
+        assert_eq!(pilot.observe(NOW, &shown, PLENTY), []);
+        assert_eq!(pilot.observe(NOW + HOUR, &shown, PLENTY), []);
+    }
+    // Where another takes its place anyway, it does at once.
+    let (mut pilot, mut shown) = running();
+    shown[2].state = TaskState::Ending;
+    assert_eq!(pilot.observe(NOW, &shown, PLENTY), [submit(2, 1)]);
 }
 
 #[test]

@@ -170,12 +170,16 @@ impl Errand {
         let (queue, site) = (&self.camp.queue, &self.camp.site.name);
         let shown = queue.list(&self.camp.prefix())?;
         known.is_empty = !shown.iter().any(|task| task.state.is_live());
-        for action in known.pilot.observe(now, &shown, wanted) {
+        let mut actions = known.pilot.observe(now, &shown, wanted);
+        while let [Action::LookUp(arrays)] = &actions[..] {
+            let kept = queue.ended(arrays)?;
+            known.pilot.have_ended(now, arrays, &kept);
+            actions = known.pilot.observe(now, &shown, wanted);
+        }
+        for action in actions {
             match action {
-                Action::LookUp(arrays) => {
-                    let kept = queue.ended(&arrays)?;
-                    known.pilot.have_ended(now, &arrays, &kept);
-                }
+                // It stands alone, and is done.
+                Action::LookUp(_) => {}
                 Action::Delete(tasks) => {
                     let count = tasks.len();
                     tracing::info!(site, count, "allocations that nobody needs are deleted");
