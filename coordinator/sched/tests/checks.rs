@@ -158,18 +158,6 @@ fn joins_for(farm: &mut Farm, id: u64, time_left: Option<Span>) {
     .wants_tiles(id, 1);
 }
 
-/// The blocks of leases since somebody last looked, as (worker, number, blocks).
-fn leased_blocks(farm: &mut Farm) -> Vec<(u64, u64, Vec<Rect>)> {
-    let effects = farm.never_mind();
-    let leases = effects.into_iter().filter_map(|effect| match effect {
-        Effect::Lease { worker, lease } => {
-            Some((worker.id, lease.attempt.number, lease.blocks().collect()))
-        }
-        _ => None,
-    });
-    leases.collect()
-}
-
 #[test]
 fn a_check_is_cut_down_to_what_a_worker_has_time_for_and_goes_on_where_one_ended() {
     let mut farm = by_time();

@@ -3,7 +3,7 @@
 mod situation;
 
 use model::{Digest, JobId, Rect, Span};
-use sched::{Effect, Event, ImageState, RevokeReason};
+use sched::{Event, ImageState, RevokeReason};
 use situation::*;
 
 const BLOCK: Span = Span::from_secs(5);
@@ -27,17 +27,6 @@ fn stores(farm: &mut Farm, (id, number): (u64, u64), rect: Rect) {
         elapsed: BLOCK,
         pixels: Digest([7; 32]),
     });
-}
-
-fn leases(farm: &mut Farm) -> Vec<(u64, u64, Vec<Rect>)> {
-    let effects = farm.never_mind();
-    let leases = effects.into_iter().filter_map(|effect| match effect {
-        Effect::Lease { worker, lease } => {
-            Some((worker.id, lease.attempt.number, lease.blocks().collect()))
-        }
-        _ => None,
-    });
-    leases.collect()
 }
 
 /// Worker 1 has made both tiles, worker 2 has begun to check the first, worker 3 has checked the second; both of them want more,
@@ -66,7 +55,10 @@ fn a_slow_check_is_done_from_both_ends_and_the_first_result_wins() {
     // It is ten seconds late; nobody gives it up.
     farm.waits_with_heartbeats(Span::from_secs(3), 2, &[(3, 0)]);
     let blocks: Vec<Rect> = tile(0).blocks().collect();
-    assert_eq!(leases(&mut farm), [(3, 5, vec![blocks[1], blocks[0]])]);
+    assert_eq!(
+        leased_blocks(&mut farm),
+        [(3, 5, vec![blocks[1], blocks[0]])]
+    );
     stores(&mut farm, (3, 5), blocks[1]);
     assert_eq!(state(&farm, 0), ImageState::Rendering);
     stores(&mut farm, (2, 3), blocks[0]);
@@ -87,9 +79,9 @@ fn whoever_made_it_or_failed_it_helps_nobody_with_a_check() {
     farm.waits_with_heartbeats(Span::from_secs(3), 2, &[(3, 0)]);
     // Worker 1, which made it, has not been asked; where the helper fails, the first goes on alone.
     farm.fails(3, 5);
-    assert!(leases(&mut farm).iter().all(|&(id, ..)| id == 3));
+    assert!(leased_blocks(&mut farm).iter().all(|&(id, ..)| id == 3));
     farm.waits_with_heartbeats(Span::from_secs(20), 2, &[(3, 0)]);
-    assert_eq!(leases(&mut farm), []);
+    assert_eq!(leased_blocks(&mut farm), []);
     for rect in tile(0).blocks() {
         stores(&mut farm, (2, 3), rect);
     }
@@ -104,7 +96,7 @@ fn two_that_fail_a_check_together_do_not_end_it() {
     farm.never_mind();
     assert_eq!(state(&farm, 0), ImageState::Rendering);
     farm.wants_tiles(4, 1);
-    let (id, number, blocks) = leases(&mut farm).remove(0);
+    let (id, number, blocks) = leased_blocks(&mut farm).remove(0);
     assert_eq!(id, 4);
     for rect in blocks {
         stores(&mut farm, (4, number), rect);

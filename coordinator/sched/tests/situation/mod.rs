@@ -230,6 +230,18 @@ pub(crate) fn makes(farm: &mut Farm, (id, number): (u64, u64), image: u32, index
     }
 }
 
+/// The blocks of leases since somebody last looked, as (worker, number, blocks).
+pub(crate) fn leased_blocks(farm: &mut Farm) -> Vec<(u64, u64, Vec<Rect>)> {
+    let effects = farm.never_mind();
+    let leases = effects.into_iter().filter_map(|effect| match effect {
+        Effect::Lease { worker, lease } => {
+            Some((worker.id, lease.attempt.number, lease.blocks().collect()))
+        }
+        _ => None,
+    });
+    leases.collect()
+}
+
 /// The attempts that were leased since somebody last looked, as (worker, number, tile).
 pub(crate) fn leased(farm: &mut Farm) -> Vec<(u64, u64, u32)> {
     let effects = farm.never_mind();
