@@ -20,6 +20,7 @@ use model::{Digest, ImageNumber, Rect, Resolution};
 use render::{Assets, Counts, EvalSettings, ImageRenderer, Means};
 use scene::Description;
 
+use super::crew::Threads;
 use super::line::{Line, Next, last};
 use super::statistics::{Spent, clock, told};
 use crate::error::Error;
@@ -268,10 +269,12 @@ impl Shared<'_> {
     /// Compiles an image and opens its scratch file; returns it where nothing is left to render.
     fn open(&self, image: ImageNumber, events: &Sender<Event>) -> Result<Option<Work>, Error> {
         let plan = self.plan;
-        let renderer = ImageRenderer::new(plan.description, plan.assets, image, plan.settings)
-            .map_err(|error| {
-                Error::failed(format!("cannot render frame {image}")).because(error)
-            })?;
+        // Where there is nothing to render beside it, the other threads only wait for this.
+        let crew = Threads(if self.line.is_idle() { plan.threads } else { 1 });
+        let renderer =
+            ImageRenderer::by(&crew, plan.description, plan.assets, image, plan.settings).map_err(
+                |error| Error::failed(format!("cannot render frame {image}")).because(error),
+            )?;
         let film = &plan.description.film;
         let identity = ScratchIdentity {
             scene: plan.digest,
@@ -296,13 +299,16 @@ impl Shared<'_> {
         self.blocks_found
             .fetch_add(squares as u64, Ordering::Relaxed);
         let blocks = in_tiles(remaining, film.window, plan.tile);
+        self.blocks
+            .fetch_add(blocks.len() as u64, Ordering::Relaxed);
+        let least = renderer.together();
         let work = Work {
             image,
             renderer,
             scratch,
             counts: Mutex::default(),
         };
-        Ok(self.line.opened(work, blocks))
+        Ok(self.line.opened(work, blocks, least))
     }
 
     /// Renders one block into its place; one that was cancelled leaves nothing.
@@ -329,7 +335,6 @@ impl Shared<'_> {
             Error::failed(format!("cannot keep a part of frame {}", work.image)).because(error)
         })?;
         self.pixels.fetch_add(block.area(), Ordering::Relaxed);
-        self.blocks.fetch_add(1, Ordering::Relaxed);
         self.rays.fetch_add(counts.rays, Ordering::Relaxed);
         *unpoisoned(work.counts.lock()) += counts;
         Ok(())

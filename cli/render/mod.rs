@@ -1,5 +1,6 @@
 //! Rendering in this process: `line` says which block is next, `engine` renders it, `statistics` says what it took.
 
+mod crew;
 mod engine;
 mod line;
 mod statistics;

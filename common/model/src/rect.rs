@@ -102,6 +102,20 @@ impl Rect {
         })
     }
 
+    /// Its left and right or its upper and lower half, across the longer side; the first is the larger, and the second
+    /// empty where there is one pixel.
+    pub const fn halves(self) -> [Self; 2] {
+        let (mut first, mut second) = (self, self);
+        if self.width() > self.height() {
+            first.x1 = self.x0 + self.width().div_ceil(2);
+            second.x0 = first.x1;
+        } else {
+            first.y1 = self.y0 + self.height().div_ceil(2);
+            second.y0 = first.y1;
+        }
+        [first, second]
+    }
+
     /// Whether it lies inside one grid square, as every block does.
     pub fn is_block(self) -> bool {
         !self.is_empty()
@@ -164,5 +178,23 @@ mod tests {
             y1: 9,
         };
         assert_eq!(empty.blocks().count(), 0);
+    }
+
+    #[test]
+    fn halves_are_a_block_s_two_parts() {
+        for (x1, y1) in [(64, 64), (64, 33), (33, 64), (35, 33), (33, 33)] {
+            let block = Rect {
+                x0: 32,
+                y0: 32,
+                x1,
+                y1,
+            };
+            let [first, second] = block.halves();
+            assert!(first.is_block() && block.contains(first) && block.contains(second));
+            assert!(first.area() >= second.area());
+            assert_eq!(first.area() + second.area(), block.area());
+            assert_eq!(first.intersection(second), None);
+            assert_eq!(second.is_empty(), block.area() == 1);
+        }
     }
 }

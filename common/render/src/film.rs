@@ -16,30 +16,24 @@ pub(crate) struct Seen {
     pub(crate) surface: Option<(f64, DVec3)>,
 }
 
-/// The pixels of a block, filled one after another.
+/// The pixels of a block, filled in any order.
 pub(crate) struct Film<'a> {
     pixels: &'a mut Vec<f32>,
-    area: usize,
-    next: usize,
+    block: Rect,
 }
 
 impl<'a> Film<'a> {
     /// An empty film in `pixels`, plane by plane.
     pub(crate) fn new(block: Rect, pixels: &'a mut Vec<f32>) -> Self {
-        let area = block.width() as usize * block.height() as usize;
         pixels.clear();
-        pixels.resize(area * CHANNEL_COUNT, 0.0);
-        Self {
-            pixels,
-            area,
-            next: 0,
-        }
+        pixels.resize(area(block) * CHANNEL_COUNT, 0.0);
+        Self { pixels, block }
     }
 
-    /// Adds the next pixel, the mean of its samples: summed in their order, each of the same weight.
+    /// Fills a pixel with the mean of its samples: summed in their order, each of the same weight.
     ///
     /// A sample that is not finite counts as black, and is counted.
-    pub(crate) fn push(&mut self, samples: &[Seen], counts: &mut Counts) {
+    pub(crate) fn put(&mut self, (x, y): (u32, u32), samples: &[Seen], counts: &mut Counts) {
         let mut light = [0.0; 3];
         let mut normal = DVec3::ZERO;
         let (mut met, mut way) = (0.0, 0.0);
@@ -68,12 +62,18 @@ impl<'a> Film<'a> {
             normal.y * weight,
             normal.z * weight,
         ];
+        let block = self.block;
+        let place = (y - block.y0) as usize * block.width() as usize + (x - block.x0) as usize;
         for (plane, value) in values.into_iter().enumerate() {
-            self.pixels[plane * self.area + self.next] = single(value);
+            self.pixels[plane * area(block) + place] = single(value);
         }
-        self.next += 1;
         counts.pixels += 1;
     }
+}
+
+/// The number of a block's pixels.
+fn area(block: Rect) -> usize {
+    block.width() as usize * block.height() as usize
 }
 
 /// The nearest `f32`, never infinite.
@@ -105,7 +105,8 @@ mod tests {
         };
         let mut pixels = Vec::new();
         let mut counts = Counts::default();
-        Film::new(PIXEL, &mut pixels).push(
+        Film::new(PIXEL, &mut pixels).put(
+            (PIXEL.x0, PIXEL.y0),
             &[
                 seen(1.0, Some((10.0, DVec3::Z))),
                 seen(0.0, None),
@@ -126,7 +127,7 @@ mod tests {
             radiance: [red, 1.0, 1.0],
             surface: None,
         });
-        Film::new(PIXEL, &mut pixels).push(&seen, &mut counts);
+        Film::new(PIXEL, &mut pixels).put((PIXEL.x0, PIXEL.y0), &seen, &mut counts);
         assert!(pixels.iter().all(|value| value.is_finite()));
         assert_eq!(counts.not_finite, 2);
     }

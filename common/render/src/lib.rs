@@ -12,6 +12,7 @@
 
 mod assets;
 mod counts;
+mod crew;
 mod error;
 mod film;
 mod grids;
@@ -29,6 +30,7 @@ mod tests;
 
 pub use assets::Assets;
 pub use counts::Counts;
+pub use crew::{Alone, Crew};
 pub use error::{Cancelled, RenderError};
 pub use field::SimdLevel;
 pub use renderer::{EvalSettings, ImageRenderer};

@@ -10,6 +10,7 @@ use scene::Description;
 
 use crate::assets::Assets;
 use crate::counts::Counts;
+use crate::crew::{Alone, Crew};
 use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
 use crate::grids;
@@ -74,11 +75,33 @@ impl ImageRenderer {
         image: ImageNumber,
         settings: EvalSettings,
     ) -> Result<Self, RenderError> {
-        Self::without(None, description, assets, image, settings)
+        Self::prepared(&Alone, None, description, assets, image, settings)
+    }
+
+    /// The same by a crew, in less time.
+    pub fn by(
+        crew: &dyn Crew,
+        description: &Description,
+        assets: &Assets,
+        image: ImageNumber,
+        settings: EvalSettings,
+    ) -> Result<Self, RenderError> {
+        Self::prepared(crew, None, description, assets, image, settings)
     }
 
     /// The same, but a technique of the tracer is left out: the same pixels by more work, for measuring what it gains.
     pub fn without(
+        technique: Option<Technique>,
+        description: &Description,
+        assets: &Assets,
+        image: ImageNumber,
+        settings: EvalSettings,
+    ) -> Result<Self, RenderError> {
+        Self::prepared(&Alone, technique, description, assets, image, settings)
+    }
+
+    fn prepared(
+        crew: &dyn Crew,
         technique: Option<Technique>,
         description: &Description,
         assets: &Assets,
@@ -108,7 +131,7 @@ impl ImageRenderer {
         let start = f64::from(image.0) / film.fps;
         let view = View::new(&description.camera, film, start);
         let (start, end) = view.instants();
-        let surface = Surface::without(description, &view, settings, technique)?;
+        let surface = Surface::prepared(crew, description, &view, settings, technique)?;
         let palette = Palette::new(description, assets, Interval::new(start, end))?;
         let up = surface.vertical(view.eye());
         let ground = mean_albedo(&description.surface.material);
@@ -135,6 +158,12 @@ impl ImageRenderer {
     /// By what means its rays are traced.
     pub fn means(&self) -> Means {
         self.surface.means
+    }
+
+    /// Most pixels that are worked on together. A larger block is cut into [halves](Rect::halves), and these again, until none
+    /// is larger: such parts may as well be rendered as blocks of their own, by the same work.
+    pub fn together(&self) -> u64 {
+        (TOGETHER / self.strata.per_pixel()).max(1) as u64
     }
 
     /// Renders the pixels of `block`, any rectangle of the image.
@@ -177,17 +206,20 @@ impl ImageRenderer {
         work.tracer.scratch.noise_evaluations = 0;
         let mut counts = Counts::default();
         let mut film = Film::new(block, pixels);
-        let per_pixel = self.strata.per_pixel();
-        let places: Vec<(u32, u32)> = (block.y0..block.y1)
-            .flat_map(|y| (block.x0..block.x1).map(move |x| (x, y)))
-            .collect();
-        for places in places.chunks((TOGETHER / per_pixel).max(1)) {
+        let mut parts = vec![block];
+        while let Some(part) = parts.pop() {
+            if part.area() > self.together() {
+                let [first, second] = part.halves();
+                parts.extend([second, first]);
+                continue;
+            }
             work.tracer.stopwatch.begin(Part::Sampling);
             work.clear();
-            for &(x, y) in places {
+            let places = (part.y0..part.y1).flat_map(|y| (part.x0..part.x1).map(move |x| (x, y)));
+            for (x, y) in places.clone() {
                 self.strata.of_pixel(x, y, &mut work.samples);
             }
-            let corner = [block.x0, block.y0];
+            let corner = [part.x0, part.y0];
             if Technique::Curve.is_used(self.surface.without) {
                 arrange(&mut work.samples, corner, self.slices, &mut work.from);
             } else {
@@ -197,8 +229,9 @@ impl ImageRenderer {
             self.see(&mut work, cancel, &mut counts)?;
             work.tracer.stopwatch.begin(Part::Film);
             work.put_back();
-            for seen in work.in_order.chunks_exact(per_pixel) {
-                film.push(seen, &mut counts);
+            let seen = work.in_order.chunks_exact(self.strata.per_pixel());
+            for (place, seen) in places.zip(seen) {
+                film.put(place, seen, &mut counts);
             }
         }
         counts.noise_evaluations += work.tracer.scratch.noise_evaluations;

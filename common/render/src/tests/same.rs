@@ -6,7 +6,7 @@ use model::{ImageNumber, Rect};
 
 use super::scenes::{self, block, image, renderer};
 use crate::{
-    Assets, Cancelled, EvalSettings, ImageRenderer, Means, RenderError, SimdLevel, Technique,
+    Assets, Cancelled, Crew, EvalSettings, ImageRenderer, Means, RenderError, SimdLevel, Technique,
 };
 
 #[test]
@@ -90,6 +90,62 @@ fn paste(part: &[f32], rect: Rect, pixels: &mut [f32], whole: Rect) {
             rect.y0 as usize + rest / width,
         );
         pixels[plane * full + y * whole.width() as usize + x] = *value;
+    }
+}
+
+#[test]
+fn parts_of_a_block_take_the_work_of_the_block() {
+    let mut cut = 0;
+    for (name, mut scene) in scenes::all() {
+        if scene.sampling.filter_order > 0 {
+            scene.sampling.rays = 5;
+        }
+        let renderer = renderer(&scene, EvalSettings::default());
+        let mut whole = scene.film.resolution.rect();
+        (whole.x1, whole.y1) = (whole.x1.min(32), whole.y1.min(24));
+        let (reference, counts) = block(&renderer, whole);
+        let mut total = crate::Counts::default();
+        let mut pixels = vec![f32::NAN; reference.len()];
+        let mut parts = vec![whole];
+        while let Some(part) = parts.pop() {
+            if part.area() > renderer.together() {
+                parts.extend(part.halves());
+                cut += 1;
+                continue;
+            }
+            let (values, counts) = block(&renderer, part);
+            total += counts;
+            paste(&values, part, &mut pixels, whole);
+        }
+        assert!(pixels == reference, "{name} differs when cut");
+        assert_eq!(total, counts, "{name}");
+    }
+    assert!(cut > 0, "no scene has enough samples to be cut");
+}
+
+#[test]
+fn a_crew_prepares_the_same_image() {
+    /// A thread for every piece.
+    struct Many(AtomicU64);
+    impl Crew for Many {
+        fn each(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
+            std::thread::scope(|scope| {
+                for index in (0..count).rev() {
+                    self.0.fetch_add(1, Ordering::Relaxed);
+                    scope.spawn(move || piece(index));
+                }
+            });
+        }
+    }
+    for (name, scene) in scenes::all() {
+        let (crew, settings) = (Many(AtomicU64::new(0)), EvalSettings::default());
+        let image = ImageNumber(1);
+        let by = ImageRenderer::by(&crew, &scene, &Assets::new(), image, settings).unwrap();
+        let alone = renderer(&scene, settings);
+        assert_eq!(by.means(), alone.means(), "{name}");
+        let whole = scene.film.resolution.rect();
+        assert!(block(&by, whole) == block(&alone, whole), "{name}");
+        assert!(crew.0.into_inner() > 1, "{name}: nothing is shared");
     }
 }
 

@@ -7,6 +7,7 @@ use scene::description::{Bound, Seed};
 use super::batch::Lanes;
 use super::grid::FAR;
 use super::techniques::Technique;
+use crate::crew::{Crew, in_order};
 use crate::view::Footprint;
 
 /// Distances are shortened by this share, for the rounding of their own few operations.
@@ -201,22 +202,24 @@ pub(crate) struct Around<'a> {
 impl Clearances {
     /// Tables for distances from about `nearest` metres to the farthest place of the bound; nearer and beyond the
     /// first table serves.
-    pub(crate) fn new(around: &Around<'_>, nearest: f64) -> Self {
+    pub(crate) fn new(around: &Around<'_>, nearest: f64, crew: &dyn Crew) -> Self {
         let known = match around.rest {
             Some(_) => Known::of_seed(around.seed),
             None => Known::Nothing,
         };
-        let mut tables = vec![around.table(0.0, FAR, f64::INFINITY)];
+        let mut wanted = vec![(0.0, FAR, f64::INFINITY)];
         let first = exponent(nearest);
         if around.footprint.angle > 0.0 && Technique::Distances.is_used(around.without) {
             let last = exponent(around.farthest());
             for exponent in first..=last {
                 let distance = power(exponent);
-                tables.push(around.table(distance / 2.0, distance * 4.0, distance / 2.0));
+                wanted.push((distance / 2.0, distance * 4.0, distance / 2.0));
             }
         }
         Self {
-            tables,
+            tables: in_order(crew, &wanted, |&(near, far, reach)| {
+                around.table(near, far, reach)
+            }),
             first,
             known,
         }

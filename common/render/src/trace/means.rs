@@ -1,8 +1,8 @@
 //! By what means single rays find how far they may step.
 //!
 //! Each costs more per step than the one before and needs fewer of them; how many, depends on the field and on
-//! where it is seen from. So some rays of the image are traced by each, their steps counted, and the cheapest
-//! is taken. It decides how fast rays are traced and nothing else.
+//! where it is seen from. So some rays of the image are traced by each, and their steps counted
+//! ([`super::choice`]).
 
 use core::sync::atomic::AtomicBool;
 
@@ -11,6 +11,7 @@ use field::{Interval, Segment};
 use super::surface::Surface;
 use super::tracer::{Goal, Ray, Tracer};
 use crate::counts::Counts;
+use crate::crew::{Crew, in_order};
 use crate::sample::Sample;
 use crate::view::View;
 
@@ -121,32 +122,67 @@ const SIDE: u32 = 4;
 /// no field can make preparing an image take long.
 pub(crate) const STEPS_MAX: f64 = 1024.0;
 
-/// The means by which the rays of `view` need least, of those allowed, or ranges where all of them need many; and what a
-/// ray then costs, in evaluations of a value.
-pub(crate) fn cheapest(surface: &Surface, view: &View, allowed: &[Means]) -> (Means, f64) {
-    let rays = rays(surface, view);
-    let mut tracer = Tracer::default();
-    let mut best = (Means::Values, f64::INFINITY);
-    for &means in allowed {
-        let cost = cost(surface, &mut tracer, &rays, means, STEPS_MAX);
-        if cost < best.1 {
-            best = (means, cost);
-        }
-    }
-    if best.1 > DEAR {
-        let ranges = Means::Ranges(Arithmetic::Reduced);
-        let few: Vec<_> = rays.into_iter().step_by(FEW).collect();
-        let steps_max = PATIENCE * best.1 / ranges.cost();
-        let cost = cost(surface, &mut tracer, &few, ranges, steps_max);
-        if cost < best.1 {
-            return (ranges, cost);
-        }
-    }
-    best
+/// Some rays of an image, to be traced in several ways.
+pub(crate) struct Trial<'a> {
+    rays: Vec<Ray>,
+    crew: &'a dyn Crew,
 }
 
-/// What a ray costs on average, in evaluations of a value.
-fn cost(surface: &Surface, tracer: &mut Tracer, rays: &[Ray], means: Means, steps_max: f64) -> f64 {
+impl<'a> Trial<'a> {
+    /// Rays from all over the image.
+    pub(crate) fn new(surface: &Surface, view: &View, crew: &'a dyn Crew) -> Self {
+        Self {
+            rays: rays(surface, view),
+            crew,
+        }
+    }
+
+    /// The means by which the rays need least, of those allowed, or ranges where all of them need many; and what a
+    /// ray then costs, in evaluations of a value.
+    pub(crate) fn cheapest(
+        &self,
+        surface: &Surface,
+        allowed: &[Means],
+        steps_max: f64,
+    ) -> (Means, f64) {
+        let costs = in_order(self.crew, allowed, |&means| {
+            self.cost(surface, means, steps_max)
+        });
+        let mut best = (Means::Values, f64::INFINITY);
+        for (&means, cost) in allowed.iter().zip(costs) {
+            if cost < best.1 {
+                best = (means, cost);
+            }
+        }
+        if best.1 > DEAR && best.1 < f64::INFINITY {
+            let ranges = Means::Ranges(Arithmetic::Reduced);
+            let few: Vec<_> = self.rays.iter().copied().step_by(FEW).collect();
+            let steps_max = PATIENCE * best.1 / ranges.cost();
+            let (cost, _) = cost(surface, &few, ranges, steps_max);
+            if cost < best.1 {
+                return (ranges, cost);
+            }
+        }
+        best
+    }
+
+    /// What a ray costs on average, in evaluations of a value; infinitely much where fewer steps than [`STEPS_MAX`] are allowed
+    /// and one needs more.
+    pub(crate) fn cost(&self, surface: &Surface, means: Means, steps_max: f64) -> f64 {
+        let steps_max = if steps_max < STEPS_MAX {
+            steps_max
+        } else {
+            STEPS_MAX
+        };
+        match cost(surface, &self.rays, means, steps_max) {
+            (_, exhausted) if exhausted > 0 && steps_max < STEPS_MAX => f64::INFINITY,
+            (cost, _) => cost,
+        }
+    }
+}
+
+/// What one of these rays costs on average, and how many need more steps than those.
+fn cost(surface: &Surface, rays: &[Ray], means: Means, steps_max: f64) -> (f64, u64) {
     let surface = Surface {
         means,
         steps_max,
@@ -155,12 +191,14 @@ fn cost(surface: &Surface, tracer: &mut Tracer, rays: &[Ray], means: Means, step
     let (mut counts, mut hits) = (Counts::default(), Vec::new());
     let never = AtomicBool::new(false);
     let goal = Goal::Distance;
+    let mut tracer = Tracer::default();
     let done = tracer.trace(&surface, goal, rays, &never, &mut counts, &mut hits);
     if done.is_err() {
-        return f64::INFINITY;
+        return (f64::INFINITY, 0);
     }
     let steps = counts.steps as f64;
-    ((counts.evaluations as f64 - steps) + steps * means.cost_for(&surface)) / rays.len() as f64
+    let values = (counts.evaluations as f64 - steps) + steps * means.cost_for(&surface);
+    (values / rays.len() as f64, counts.exhausted)
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.

@@ -9,12 +9,15 @@ use scene::description::{Bound, Seed};
 
 use super::clearance::{Around, Clearances};
 use super::grid::Grid;
-use super::ground::{self, Ground, Site};
-use super::means::{self, Means};
+use super::ground::{Ground, Site};
+use super::means::Means;
 use super::search::STEPS_MAX;
 use super::split::split;
 use super::techniques::Technique;
 use super::tracer::Ray;
+#[cfg(test)]
+use crate::crew::Alone;
+use crate::crew::Crew;
 use crate::error::RenderError;
 use crate::renderer::EvalSettings;
 use crate::view::{Footprint, Sight, View};
@@ -82,11 +85,12 @@ impl Surface {
             level,
             ..EvalSettings::default()
         };
-        Self::without(description, view, settings, None)
+        Self::prepared(&Alone, description, view, settings, None)
     }
 
-    /// The same as the settings say, with a technique left out.
-    pub(crate) fn without(
+    /// The same as the settings say, by a crew, with a technique left out.
+    pub(crate) fn prepared(
+        crew: &dyn Crew,
         description: &Description,
         view: &View,
         EvalSettings { level, means }: EvalSettings,
@@ -137,14 +141,14 @@ impl Surface {
         let has_ground = rest.is_some() && Technique::Ground.is_used(without);
         let ground = Some(site).filter(|_| has_ground);
         let ground = ground.and_then(|site| Ground::new(&site)).map(Arc::new);
-        let clearances = Arc::new(Clearances::new(&around, nearest));
+        let clearances = Arc::new(Clearances::new(&around, nearest, crew));
         let sight = if footprint.angle > 0.0 {
             Grid::from_eye(footprint.angle * SHARE)
         } else {
             let spacing = footprint.base * SHARE;
             Grid::even(spacing, spacing * EVEN_POINTS)
         };
-        let mut surface = Self {
+        let surface = Self {
             moves: program.moves(),
             ground: None,
             means: Means::Values,
@@ -160,64 +164,7 @@ impl Surface {
             footprint,
             sight,
         };
-        let is_used = |technique: Technique| technique.is_used(without);
-        let looks_ahead = surface.clearances.have_errors() && surface.program.looks_ahead();
-        let is_known = |means: &Means| match means {
-            Means::Values | Means::Ranges(_) => true,
-            Means::Tangents => surface.clearances.have_tangents() && is_used(Technique::Tangents),
-            Means::Stretches => looks_ahead && is_used(Technique::Stretches),
-        };
-        let all = [Means::Values, Means::Tangents, Means::Stretches];
-        let allowed: Vec<_> = match means {
-            Some(means) if is_known(&means) => vec![means],
-            Some(_) => vec![Means::Values],
-            None => all.into_iter().filter(is_known).collect(),
-        };
-        let ranges = allowed
-            .iter()
-            .any(|means| matches!(means, Means::Ranges(_)));
-        let ground = ground.filter(|_| !ranges);
-        surface.means = allowed[0];
-        if means.is_some() && ground.is_none() {
-            return Ok(surface);
-        }
-        let (cheapest, mut cost) = means::cheapest(&surface, view, &allowed);
-        surface.means = cheapest;
-        if ground.is_some() {
-            let led = Self {
-                ground,
-                ..surface.clone()
-            };
-            let (cheapest, led_cost) = means::cheapest(&led, view, &allowed);
-            if led_cost + ground::COST < cost {
-                surface = Self {
-                    means: cheapest,
-                    ..led
-                };
-                cost = led_cost;
-            }
-        }
-        if surface.means == Means::Stretches && !surface.walks() {
-            let (back, bends) = (is_used(Technique::Hindsight), is_used(Technique::Bends));
-            for looks in [
-                Looks { back, bends: false },
-                Looks { back: false, bends },
-                Looks { back, bends },
-            ] {
-                if looks == surface.looks {
-                    continue;
-                }
-                let other = Self {
-                    looks,
-                    ..surface.clone()
-                };
-                let (_, other_cost) = means::cheapest(&other, view, &[Means::Stretches]);
-                if other_cost < cost {
-                    (surface, cost) = (other, other_cost);
-                }
-            }
-        }
-        Ok(surface)
+        Ok(surface.chosen(view, ground, means, crew))
     }
 
     /// Whether single rays walk as far as they are outside in one step.
