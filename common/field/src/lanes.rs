@@ -133,15 +133,11 @@ pub(crate) fn values_gradients<S: Simd>(
             assert!(n <= BATCH);
             cells.hash(n, lattice);
             for i in 0..n {
-                [gx[i], gy[i], gz[i]] =
-                    noise::mean_gradient(cells.corners_at(i), cells.offset_at(i));
-            }
-            for i in 0..n {
-                let (value, [x, y, z]) = noise::value_bend(cells.corners_at(i), cells.offset_at(i));
+                let (corners, offset) = (cells.corners_at(i), cells.offset_at(i));
+                let mean = noise::mean_gradient(corners, offset);
+                let (value, bend) = noise::value_bend(corners, offset);
                 out[i] = value;
-                gx[i] += x;
-                gy[i] += y;
-                gz[i] += z;
+                [gx[i], gy[i], gz[i]] = [mean[0] + bend[0], mean[1] + bend[1], mean[2] + bend[2]];
             }
         },
     );
