@@ -145,7 +145,7 @@ impl ImageRenderer {
             } else {
                 1
             },
-            sky: Sky::new(description, start, up, ground),
+            sky: Sky::new(description, start, up, ground, crew),
             clouds: Clouds::new(description, view.eye(), Interval::new(start, end))?,
             view,
             surface,

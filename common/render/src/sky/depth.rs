@@ -1,5 +1,7 @@
 //! How much air lies between a height and space, tabulated.
 
+use std::sync::OnceLock;
+
 use super::air::{Depth, GROUND, TOP};
 
 /// Entries over heights and over directions.
@@ -37,7 +39,13 @@ pub(crate) fn horizon(height: f64) -> f64 {
 }
 
 impl Depths {
-    pub(crate) fn new() -> Self {
+    /// Those of the Earth's air: the same for every sky, and computed once.
+    pub(crate) fn known() -> &'static Self {
+        static KNOWN: OnceLock<Depths> = OnceLock::new();
+        KNOWN.get_or_init(Self::new)
+    }
+
+    fn new() -> Self {
         let mut table = Vec::with_capacity(HEIGHTS * DIRECTIONS);
         for row in 0..HEIGHTS {
             let share = row as f64 / (HEIGHTS - 1) as f64;

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::air::{Air, Colour, Depth, haze_phase, rayleigh_phase};
 use super::depth::{Depths, height_along, place, to_space};
+use crate::crew::{Crew, in_order};
 
 /// Entries from the horizon to the zenith, densest at the horizon.
 const ROWS: usize = 64;
@@ -47,8 +48,8 @@ pub(crate) struct Dome {
 
 impl Dome {
     /// The sky over a place whose vertical is `up`, with the sun in direction `sun`.
-    pub(crate) fn new(air: &Air, up: DVec3, sun: DVec3) -> Self {
-        let depths = Depths::new();
+    pub(crate) fn new(air: &Air, up: DVec3, sun: DVec3, crew: &dyn Crew) -> Self {
+        let depths = Depths::known();
         let sine = sun.dot(up);
         let level = sun - up * sine;
         let length = level.dot(level).sqrt();
@@ -60,24 +61,26 @@ impl Dome {
         let sunlight = depths
             .at(EYE, sine)
             .map_or([0.0; 3], |depth| air.transmitted(depth));
+        let rows: [usize; ROWS] = core::array::from_fn(|row| row);
+        let entries = in_order(crew, &rows, |&row| {
+            let share = row as f64 / (ROWS - 1) as f64;
+            let rise = share * share;
+            let flat = (1.0 - rise * rise).sqrt();
+            let columns: [Entry; COLUMNS] = core::array::from_fn(|column| {
+                let side = 1.0 - 2.0 * column as f64 / (COLUMNS - 1) as f64;
+                // The cosine of the angle to the sun decides about the Earth's shadow alone.
+                let towards = flat * side * length + rise * sine;
+                gather(air, depths, rise, sine, towards)
+            });
+            columns
+        });
         let mut dome = Self {
             up,
             sun,
             sunwards,
-            entries: Vec::with_capacity(ROWS * COLUMNS),
+            entries: entries.into_iter().flatten().collect(),
             sunlight,
         };
-        for row in 0..ROWS {
-            let share = row as f64 / (ROWS - 1) as f64;
-            let rise = share * share;
-            let flat = (1.0 - rise * rise).sqrt();
-            for column in 0..COLUMNS {
-                let side = 1.0 - 2.0 * column as f64 / (COLUMNS - 1) as f64;
-                // The cosine of the angle to the sun decides about the Earth's shadow alone.
-                let towards = flat * side * length + rise * sine;
-                dome.entries.push(gather(air, &depths, rise, sine, towards));
-            }
-        }
         let mean = dome.mean();
         for entry in &mut dome.entries {
             for (again, mean) in entry.again.iter_mut().zip(mean) {
@@ -212,6 +215,7 @@ fn gather(air: &Air, depths: &Depths, rise: f64, sun: f64, towards: f64) -> Entr
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::crew::Alone;
 
     fn dome(elevation: f64) -> Dome {
         let (sine, cosine) = libm::sincos(elevation.to_radians());
@@ -222,6 +226,7 @@ mod tests {
             },
             DVec3::Z,
             DVec3::new(0.0, cosine, sine),
+            &Alone,
         )
     }
 

@@ -18,6 +18,8 @@ pub(crate) use clouds::{Clouds, Crossing, Scanned};
 use dome::Dome;
 use harmonics::Irradiance;
 
+use crate::crew::Crew;
+
 /// Contrast that is left at the distance called visibility: 2 %, Koschmieder.
 const CONTRAST: f64 = 0.02;
 
@@ -56,7 +58,13 @@ struct Layer {
 impl Sky {
     /// The sky at an instant over a place whose vertical is `up`; `ground` is the mean
     /// reflectance of the surface, which lights what faces it.
-    pub(crate) fn new(description: &Description, time: f64, up: DVec3, ground: Colour) -> Self {
+    pub(crate) fn new(
+        description: &Description,
+        time: f64,
+        up: DVec3,
+        ground: Colour,
+        crew: &dyn Crew,
+    ) -> Self {
         let sun = DVec3::from(description.sun.direction(time));
         let strength = description.sun.irradiance;
         match &description.sky {
@@ -78,7 +86,7 @@ impl Sky {
                     rayleigh: *rayleigh,
                     haze: *haze,
                 };
-                let dome = Dome::new(&air, up, sun);
+                let dome = Dome::new(&air, up, sun, crew);
                 let sunlight = [0, 1, 2].map(|c| strength[c] * dome.sunlight[c]);
                 let layer = Layer {
                     dome,

@@ -1,6 +1,7 @@
 //! Tests of whole images and of what they promise.
 
 mod analytic;
+mod choice;
 mod golden;
 mod grids;
 mod guarantee;

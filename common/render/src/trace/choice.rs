@@ -5,14 +5,11 @@
 use std::sync::Arc;
 
 use super::ground::{self, Ground};
-use super::means::{Means, STEPS_MAX, Trial};
+use super::means::{Means, Trial};
 use super::surface::{Looks, Surface};
 use super::techniques::Technique;
-use crate::crew::{Crew, in_order};
+use crate::crew::Crew;
 use crate::view::View;
-
-/// Beside cells of the ground, rays without them are tried as far as so many times what they must not cost on average.
-const PATIENCE: f64 = 4.0;
 
 impl Surface {
     /// The surface with the means by which the rays of `view` need least: those given, or the cheapest, with or without the
@@ -42,29 +39,36 @@ impl Surface {
             return bare;
         }
         let trial = Trial::new(&bare, view, crew);
-        // Rays that are led need fewer steps, and so less time to be tried.
-        let led = ground.map(|ground| {
-            let led = Self {
-                ground: Some(ground),
-                ..bare.clone()
-            };
-            let (means, cost) = trial.cheapest(&led, &allowed, STEPS_MAX);
-            (Self { means, ..led }, cost + ground::COST)
-        });
-        let steps_max = led.as_ref().map_or(STEPS_MAX, |(_, cost)| PATIENCE * cost);
-        let (means, cost) = trial.cheapest(&bare, &allowed, steps_max);
-        let (best, cost) = match led {
-            Some((led, led_cost)) if led_cost < cost => (led, led_cost - ground::COST),
-            _ => (Self { means, ..bare }, cost),
+        let with = |surface: Self, means| Self { means, ..surface };
+        let (best, cost) = match ground {
+            None => {
+                let (means, cost) = trial.cheapest(&bare, &allowed, f64::INFINITY);
+                (with(bare, means), cost)
+            }
+            Some(ground) => {
+                let led = Self {
+                    ground: Some(ground),
+                    ..bare.clone()
+                };
+                // Rays that are led need fewer steps, so that the others need not be tried to their ends.
+                let (led_means, led_cost) = trial.cheapest(&led, &allowed, f64::INFINITY);
+                let limit = led_cost + ground::COST;
+                let (means, cost) = trial.cheapest(&bare, &allowed, limit);
+                if cost <= limit {
+                    (with(bare, means), cost)
+                } else {
+                    (with(led, led_means), led_cost)
+                }
+            }
         };
         if best.means == Means::Stretches && !best.walks() {
-            return best.looking(&trial, cost, crew);
+            return best.looking(&trial, cost);
         }
         best
     }
 
     /// Whether means say anything of this surface.
-    fn knows(&self, means: Means) -> bool {
+    pub(crate) fn knows(&self, means: Means) -> bool {
         let is_used = |technique: Technique| technique.is_used(self.without);
         let looks_ahead = self.clearances.have_errors() && self.program.looks_ahead();
         match means {
@@ -75,18 +79,16 @@ impl Surface {
     }
 
     /// With the looks along camera rays that need least, where rays cost so much without any.
-    fn looking(self, trial: &Trial, cost: f64, crew: &dyn Crew) -> Self {
+    fn looking(self, trial: &Trial<'_>, cost: f64) -> Self {
         let is_used = |technique: Technique| technique.is_used(self.without);
         let (back, bends) = (is_used(Technique::Hindsight), is_used(Technique::Bends));
         let looks = [(back, false), (false, bends), (back, bends)];
         let looks = looks.map(|(back, bends)| Looks { back, bends });
-        let costs = in_order(crew, &looks, |&looks| {
-            let other = Self {
-                looks,
-                ..self.clone()
-            };
-            trial.cost(&other, Means::Stretches, STEPS_MAX)
+        let tried = looks.map(|looks| Self {
+            looks,
+            ..self.clone()
         });
+        let costs = trial.costs(&tried, cost);
         let mut best = (self.looks, cost);
         for (looks, cost) in looks.into_iter().zip(costs) {
             if cost < best.1 {

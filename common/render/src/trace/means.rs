@@ -4,7 +4,7 @@
 //! where it is seen from. So some rays of the image are traced by each, and their steps counted
 //! ([`super::choice`]).
 
-use core::sync::atomic::AtomicBool;
+use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use field::{Interval, Segment};
 
@@ -138,16 +138,21 @@ impl<'a> Trial<'a> {
     }
 
     /// The means by which the rays need least, of those allowed, or ranges where all of them need many; and what a
-    /// ray then costs, in evaluations of a value.
+    /// ray then costs, in evaluations of a value. Of no interest is what costs more than `limit`: it may count as infinitely dear.
     pub(crate) fn cheapest(
         &self,
         surface: &Surface,
         allowed: &[Means],
-        steps_max: f64,
+        limit: f64,
     ) -> (Means, f64) {
-        let costs = in_order(self.crew, allowed, |&means| {
-            self.cost(surface, means, steps_max)
-        });
+        let tried: Vec<_> = allowed
+            .iter()
+            .map(|&means| Surface {
+                means,
+                ..surface.clone()
+            })
+            .collect();
+        let costs = self.costs(&tried, limit);
         let mut best = (Means::Values, f64::INFINITY);
         for (&means, cost) in allowed.iter().zip(costs) {
             if cost < best.1 {
@@ -158,7 +163,11 @@ impl<'a> Trial<'a> {
             let ranges = Means::Ranges(Arithmetic::Reduced);
             let few: Vec<_> = self.rays.iter().copied().step_by(FEW).collect();
             let steps_max = PATIENCE * best.1 / ranges.cost();
-            let (cost, _) = cost(surface, &few, ranges, steps_max);
+            let tried = Surface {
+                means: ranges,
+                ..surface.clone()
+            };
+            let cost = cost(tried, &few, steps_max, best.1);
             if cost < best.1 {
                 return (ranges, cost);
             }
@@ -166,27 +175,32 @@ impl<'a> Trial<'a> {
         best
     }
 
-    /// What a ray costs on average, in evaluations of a value; infinitely much where fewer steps than [`STEPS_MAX`] are allowed
-    /// and one needs more.
-    pub(crate) fn cost(&self, surface: &Surface, means: Means, steps_max: f64) -> f64 {
-        let steps_max = if steps_max < STEPS_MAX {
-            steps_max
-        } else {
-            STEPS_MAX
-        };
-        match cost(surface, &self.rays, means, steps_max) {
-            (_, exhausted) if exhausted > 0 && steps_max < STEPS_MAX => f64::INFINITY,
-            (cost, _) => cost,
-        }
+    /// What a ray costs on average with each of some surfaces. What costs more than `limit`, or than another one, may count as
+    /// infinitely dear: its trial ends where that is clear.
+    pub(crate) fn costs(&self, surfaces: &[Surface], limit: f64) -> Vec<f64> {
+        // The bits of numbers that are not negative are in the numbers' order.
+        let least = AtomicU64::new(limit.to_bits());
+        in_order(self.crew, surfaces, |surface| {
+            let limit = f64::from_bits(least.load(Ordering::Relaxed));
+            let cost = cost(surface.clone(), &self.rays, STEPS_MAX, limit);
+            least.fetch_min(cost.to_bits(), Ordering::Relaxed);
+            cost
+        })
     }
 }
 
-/// What one of these rays costs on average, and how many need more steps than those.
-fn cost(surface: &Surface, rays: &[Ray], means: Means, steps_max: f64) -> (f64, u64) {
+/// What a ray costs on average, in evaluations of a value; infinitely much if that is found to be more than `limit` before the end.
+fn cost(surface: Surface, rays: &[Ray], steps_max: f64, limit: f64) -> f64 {
+    let most = limit * rays.len() as f64;
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "the cast saturates"
+    )]
     let surface = Surface {
-        means,
         steps_max,
-        ..surface.clone()
+        evaluations_max: most as u64,
+        ..surface
     };
     let (mut counts, mut hits) = (Counts::default(), Vec::new());
     let never = AtomicBool::new(false);
@@ -194,11 +208,11 @@ fn cost(surface: &Surface, rays: &[Ray], means: Means, steps_max: f64) -> (f64, 
     let mut tracer = Tracer::default();
     let done = tracer.trace(&surface, goal, rays, &never, &mut counts, &mut hits);
     if done.is_err() {
-        return (f64::INFINITY, 0);
+        return f64::INFINITY;
     }
     let steps = counts.steps as f64;
-    let values = (counts.evaluations as f64 - steps) + steps * means.cost_for(&surface);
-    (values / rays.len() as f64, counts.exhausted)
+    let values = (counts.evaluations as f64 - steps) + steps * surface.means.cost_for(&surface);
+    values / rays.len() as f64
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.

@@ -92,7 +92,7 @@ impl Search {
             if n == 0 {
                 return Ok(());
             }
-            if cancel.load(Ordering::Relaxed) {
+            if cancel.load(Ordering::Relaxed) || counts.evaluations > surface.evaluations_max {
                 self.rays.clear();
                 return Err(Cancelled);
             }

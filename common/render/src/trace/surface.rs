@@ -58,6 +58,8 @@ pub(crate) struct Surface {
     pub(crate) looks: Looks,
     /// Most evaluations along one ray.
     pub(crate) steps_max: f64,
+    /// Most evaluations along all rays together: whoever needs more is told that it was cancelled.
+    pub(crate) evaluations_max: u64,
     /// Whether its program has been simplified, so that values outside are not those of the field.
     pub(crate) is_partial: bool,
     /// A technique that is left out.
@@ -154,6 +156,7 @@ impl Surface {
             means: Means::Values,
             looks: Looks::default(),
             steps_max: STEPS_MAX,
+            evaluations_max: u64::MAX,
             is_partial: false,
             without,
             program,
