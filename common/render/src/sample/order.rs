@@ -35,7 +35,7 @@ pub(crate) fn arrange(
             (u64::from(slice) << 32 | curve) << INDEX_BITS | index
         })
         .collect();
-    keys.sort_unstable();
+    sort(&mut keys);
     from.clear();
     #[expect(
         clippy::cast_possible_truncation,
@@ -43,6 +43,35 @@ pub(crate) fn arrange(
     )]
     from.extend(keys.iter().map(|key| *key as u32 & ((1 << INDEX_BITS) - 1)));
     *samples = from.iter().map(|&index| samples[index as usize]).collect();
+}
+
+/// Sorts by all bits above the index, whose order stays: by one byte after the other, the least first, where they differ at
+/// all. Of a block's places few do, which makes it several times as fast as comparing.
+fn sort(keys: &mut Vec<u64>) {
+    const BYTE: u32 = 8;
+    let first = keys.first().copied().unwrap_or_default();
+    let differ = keys.iter().fold(0, |bits, key| bits | (key ^ first));
+    let mut sorted = vec![0; keys.len()];
+    for shift in (INDEX_BITS..u64::BITS).step_by(BYTE as usize) {
+        let byte = |key: u64| usize::from((key >> shift).to_le_bytes()[0]);
+        if byte(differ) == 0 {
+            continue;
+        }
+        let mut next = [0; 1 << BYTE];
+        for &key in &*keys {
+            next[byte(key)] += 1;
+        }
+        let mut before = 0;
+        for next in &mut next {
+            before += std::mem::replace(next, before);
+        }
+        for &key in &*keys {
+            let place = &mut next[byte(key)];
+            sorted[*place] = key;
+            *place += 1;
+        }
+        std::mem::swap(keys, &mut sorted);
+    }
 }
 
 /// The whole part, between 0 and 2¹⁶ − 1.
@@ -67,6 +96,24 @@ fn spread(bits: u32) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_are_sorted_as_by_comparing() {
+        for mask in [0, u64::MAX, 0xff_0000, 0x00f0_3c00_1234_ffff, 0xffff << 48] {
+            let mut keys: Vec<u64> = (0..3000u32)
+                .map(|i| {
+                    let random = u64::from(field::hash::hash(&[i, 0])) << 32;
+                    let key = (random | u64::from(field::hash::hash(&[i, 1]))) & mask;
+                    key >> INDEX_BITS << INDEX_BITS | u64::from(i)
+                })
+                .collect();
+            let mut compared = keys.clone();
+            compared.sort_unstable();
+            sort(&mut keys);
+            assert_eq!(keys, compared, "{mask:x}");
+        }
+        sort(&mut Vec::new());
+    }
 
     #[test]
     fn neighbours_follow_each_other_and_nothing_is_lost() {

@@ -105,10 +105,15 @@ impl Palette {
     pub(crate) fn albedo(&self, fields: &Fields, index: usize, patch: &Patch) -> Colour {
         let field = |root: Option<usize>| root.map(|root| fields.rows[root][index]);
         let mut albedo = self.ground;
+        if self.layers.is_empty() && self.variation.is_none() {
+            return albedo.map(share);
+        }
+        let (height_spread, slope, slope_spread) =
+            (patch.height_spread(), patch.slope(), patch.slope_spread());
         for coat in &self.layers {
             let height = patch.height + field(coat.height_offset).unwrap_or(0.0);
-            let by_height = |edges| mean_rise(height, patch.height_spread, edges);
-            let by_slope = |edges| mean_rise(patch.slope, patch.slope_spread, edges);
+            let by_height = |edges| mean_rise(height, height_spread, edges);
+            let by_slope = |edges| mean_rise(slope, slope_spread, edges);
             let layer = &coat.layer;
             let mut cover = field(coat.cover).map_or(1.0, share);
             cover *= layer.above.map_or(1.0, by_height);
@@ -180,6 +185,7 @@ fn risen(u: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glam::DVec3;
 
     fn layer(albedo: f64) -> Layer {
         Layer {
@@ -221,12 +227,9 @@ mod tests {
         };
         let palette = palette(vec![layer(0.2), snow]);
         let at = |height, slope| {
-            let patch = Patch {
-                height,
-                height_spread: 0.0,
-                slope,
-                slope_spread: 0.0,
-            };
+            // Seen straight on, by a pixel without width: nothing varies.
+            let normal = DVec3::new(libm::sin(slope), 0.0, libm::cos(slope));
+            let patch = Patch::new(normal, -normal, DVec3::Z, height, 0.0);
             palette.albedo(&Fields::default(), 0, &patch)[0]
         };
         assert_eq!(at(5.0, 0.0), 0.2);

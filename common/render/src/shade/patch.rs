@@ -15,17 +15,20 @@ const FLATTEST: f64 = 1.0 / 16.0;
 /// patch twice as long hides one octave more.
 const SLOPE_PER_DOUBLING: f64 = 0.07;
 
-/// What one ray stands for on the surface.
+/// What one ray stands for on the surface. What takes roots and logarithms is computed where a material has layers, which
+/// ask for it.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub(crate) struct Patch {
     /// Mean height over the seed, metres.
     pub(crate) height: f64,
-    /// From its lowest to its highest place, metres.
-    pub(crate) height_spread: f64,
-    /// Mean angle to the horizontal, radians.
-    pub(crate) slope: f64,
-    /// Between the gentlest and the steepest place, radians.
-    pub(crate) slope_spread: f64,
+    /// Width of the pixel, metres.
+    footprint: f64,
+    /// Cosine between normal and vertical.
+    upright: f64,
+    /// Cosine between normal and ray, never less than [`FLATTEST`].
+    facing: f64,
+    /// How fast the height rises across the ray.
+    gradient: DVec3,
 }
 
 impl Patch {
@@ -40,14 +43,28 @@ impl Patch {
         let facing = facing(normal.dot(direction));
         // A step q across the ray moves the place by q − d(n·q)/(n·d) in the surface's plane, and
         // its height by q·g.
-        let gradient = vertical + normal * (vertical.dot(direction) / facing);
-        let square = gradient.dot(gradient);
         Self {
             height,
-            height_spread: footprint * square.sqrt(),
-            slope: libm::acos(normal.dot(vertical).clamp(-1.0, 1.0)),
-            slope_spread: SLOPE_PER_DOUBLING * libm::log2(1.0 / facing),
+            footprint,
+            upright: normal.dot(vertical),
+            facing,
+            gradient: vertical + normal * (vertical.dot(direction) / facing),
         }
+    }
+
+    /// From its lowest to its highest place, metres.
+    pub(crate) fn height_spread(&self) -> f64 {
+        self.footprint * self.gradient.dot(self.gradient).sqrt()
+    }
+
+    /// Mean angle to the horizontal, radians.
+    pub(crate) fn slope(&self) -> f64 {
+        libm::acos(self.upright.clamp(-1.0, 1.0))
+    }
+
+    /// Between the gentlest and the steepest place, radians.
+    pub(crate) fn slope_spread(&self) -> f64 {
+        SLOPE_PER_DOUBLING * libm::log2(1.0 / self.facing)
     }
 
     /// How many times wider than the pixel a round patch of the same area is.
@@ -82,7 +99,7 @@ mod tests {
                 (across + direction * way).z
             })
             .fold(0.0, f64::max);
-        assert!((patch.height_spread - 2.0 * highest).abs() < 1e-6);
+        assert!((patch.height_spread() - 2.0 * highest).abs() < 1e-6);
         assert_eq!(patch.height, 7.0);
     }
 
@@ -90,12 +107,12 @@ mod tests {
     fn a_surface_seen_straight_on_has_the_pixels_size() {
         let level = Patch::new(DVec3::Z, -DVec3::Z, DVec3::Z, 0.0, 0.5);
         assert_eq!(
-            (level.height_spread, level.slope, level.slope_spread),
+            (level.height_spread(), level.slope(), level.slope_spread()),
             (0.0, 0.0, 0.0)
         );
         assert_eq!(Patch::longer(-1.0), 1.0);
         assert_eq!(Patch::longer(0.0), 4.0);
         let wall = Patch::new(-DVec3::Y, DVec3::Y, DVec3::Z, 0.0, 0.5);
-        assert_eq!(wall.height_spread, 0.5);
+        assert_eq!(wall.height_spread(), 0.5);
     }
 }

@@ -66,12 +66,13 @@ impl Dome {
             let share = row as f64 / (ROWS - 1) as f64;
             let rise = share * share;
             let flat = (1.0 - rise * rise).sqrt();
-            let columns: [Entry; COLUMNS] = core::array::from_fn(|column| {
+            let mut columns = [Entry::default(); COLUMNS];
+            for (column, entry) in columns.iter_mut().enumerate() {
                 let side = 1.0 - 2.0 * column as f64 / (COLUMNS - 1) as f64;
                 // The cosine of the angle to the sun decides about the Earth's shadow alone.
                 let towards = flat * side * length + rise * sine;
-                gather(air, depths, rise, sine, towards)
-            });
+                *entry = gather(air, depths, rise, sine, towards);
+            }
             columns
         });
         let mut dome = Self {
