@@ -8,19 +8,20 @@ use render::{Counts, EvalSettings, ImageRenderer, Means, Technique};
 use serde::Serialize;
 
 use crate::bench::peers::clock;
-use crate::bench::peers::rows::{BLOB, FLIGHT, Ours, PLANET, SPHERE, STONES, TERRAIN};
+use crate::bench::peers::rows::{BLOB, FLIGHT, LAYERS, Ours, PLANET, SPHERE, STONES, TERRAIN};
 use crate::error::Error;
 use crate::load::Scene;
 use crate::output::{Report, columns};
 
-/// The scenes of `bench peers`, and one of many bodies; `--side` makes them small.
-pub(crate) const SCENES: [(&str, Ours); 6] = [
+/// The scenes of `bench peers`, one of many bodies and one of many layers; `--side` makes them small.
+pub(crate) const SCENES: [(&str, Ours); 7] = [
     ("sphere-3", SPHERE),
     ("terrain", TERRAIN),
     ("planet", PLANET),
     ("blob", BLOB),
     ("stones", STONES),
     ("flight", FLIGHT),
+    ("layers", LAYERS),
 ];
 
 /// `bench techniques`.

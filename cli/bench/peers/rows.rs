@@ -112,6 +112,9 @@ pub(crate) const TERRAIN_SHADOWS: Ours = TERRAIN.set(&["sun.shadows=true"]);
 /// A union of bodies, each with a noise of its own.
 pub(crate) const STONES: Ours = Ours::new(include_str!("../../../scenes/stones.toml"));
 
+/// A sphere of five layers of noise.
+pub(crate) const LAYERS: Ours = Ours::new(include_str!("../../../scenes/figures/fig-7-08.toml"));
+
 /// The terrain on a planet.
 pub(crate) const PLANET: Ours = Ours::new(include_str!("../../../benches/peers/planet.toml"));
 

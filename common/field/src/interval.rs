@@ -41,6 +41,11 @@ impl Interval {
         larger(self.low.abs(), self.high.abs())
     }
 
+    /// The number in its middle, or next to it.
+    pub fn middle(self) -> f64 {
+        0.5 * self.low + 0.5 * self.high
+    }
+
     /// high − low.
     pub fn width(self) -> f64 {
         self.high - self.low

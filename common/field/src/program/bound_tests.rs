@@ -130,6 +130,7 @@ impl Pairs {
                 (change - modulus.levels.first().map_or(0.0, |level| level.offset)) / distance,
             );
         }
+        self.check_cuts(name, program, &f);
         self.check_taylor(name, program, &f, &g);
         self.check_ahead(name, program, &f);
         steepest / modulus.lipschitz()
@@ -199,6 +200,35 @@ struct Asked<'a> {
     offset: &'a [f64],
     slope: &'a [f64],
     sides: Sides,
+}
+
+impl Pairs {
+    /// Leaves noises out of the program: it gives no value farther from the whole one's than it says, at any level.
+    fn check_cuts(&self, name: &str, program: &Program, f: &[f64]) {
+        for share in [0.75, 0.5, 0.25, 0.0] {
+            let Some(cut) = program.cut(share, &self.around) else {
+                continue;
+            };
+            let coarse = program.coarse(&cut).unwrap();
+            let [left, all] =
+                [&coarse, program].map(|program| program.noise_evaluations(0.0) as f64);
+            // Gradients of noises are never left out.
+            assert!(
+                left <= share * all || name.starts_with("gradient of"),
+                "{name}"
+            );
+            let moved = program.moved_by(&cut, &self.around);
+            for level in [SimdLevel::scalar(), SimdLevel::best()] {
+                let c = values(&coarse, level, &self.points(0));
+                for (f, c) in f.iter().zip(&c).filter(|(f, _)| f.is_finite()) {
+                    assert!(
+                        (f - c).abs() <= moved,
+                        "{name}, {share}: {f} and {c} are farther apart than {moved}"
+                    );
+                }
+            }
+        }
+    }
 }
 
 /// How far ahead the program is above what is asked, and how far behind, batch by batch.

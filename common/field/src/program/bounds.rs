@@ -144,6 +144,8 @@ pub(crate) struct Pass<'a> {
     moving: bool,
     /// Whether slopes are wanted that bound derivatives, even where a range says more of changes.
     derivatives: bool,
+    /// How many octaves each noise and cascade keeps, if some are left out.
+    kept: std::slice::Iter<'a, usize>,
     /// The radii at which some step's range becomes narrower than its change.
     pub(crate) crossings: Vec<f64>,
 }
@@ -155,6 +157,7 @@ impl<'a> Pass<'a> {
             radius,
             moving: true,
             derivatives: false,
+            kept: [].iter(),
             crossings: Vec::new(),
         }
     }
@@ -172,6 +175,14 @@ impl<'a> Pass<'a> {
         Self {
             moving: false,
             ..Self::new(around, 0.0)
+        }
+    }
+
+    /// A pass over what leaving out all octaves but `kept` changes, all else standing still.
+    pub(crate) fn of_cut(around: &'a Surroundings, kept: &'a [usize]) -> Self {
+        Self {
+            kept: kept.iter(),
+            ..Self::of_weights(around)
         }
     }
 
@@ -257,10 +268,12 @@ impl<'a> Pass<'a> {
             }
             Act::Curve(curve) => self.curve(curve, arg(0)),
             Act::Select => self.select(arg(0), arg(1), arg(2)),
+            Act::Noise(_) if self.keeps() == 0 => left_out(NOISE),
             Act::Noise(_) => {
                 let change = self.noise(arg(0).change());
                 self.scalar(NOISE, change)
             }
+            Act::AnyNoise(noise) if self.keeps() == 0 => left_out(noise.range()),
             Act::AnyNoise(noise) => {
                 let at = skewed(noise, arg(0), 4.0);
                 let change = self.any_noise(noise, at);
@@ -487,6 +500,11 @@ impl<'a> Pass<'a> {
         self.scalar(known.range, change)
     }
 
+    /// How many octaves the next noise or cascade keeps.
+    fn keeps(&mut self) -> usize {
+        self.kept.next().copied().unwrap_or(usize::MAX)
+    }
+
     /// The change of the noise where its argument changes so.
     fn noise(&mut self, at: Change) -> Change {
         let at = at.plus(Change::new(OFFSET_ROUNDING, 0.0));
@@ -503,6 +521,24 @@ impl<'a> Pass<'a> {
             .times(noise.slope())
             .plus(Change::new(2.0 * noise.rounding(), 0.0));
         self.limited(noise.range(), change)
+    }
+}
+
+/// A number that counts as the middle of its range.
+fn left_out(range: Interval) -> Bound {
+    let change = Change::new(0.5 * range.width(), 0.0).rounded(range.magnitude(), 1.0);
+    Bound::Scalar { range, change }
+}
+
+/// What stands for the octaves of a noise or cascade from one on: of a sum, the middle of what they can be; of others none.
+pub(crate) fn middle(act: &Act, from: usize) -> f64 {
+    match act {
+        Act::Noise(_) if from == 0 => NOISE.middle(),
+        Act::AnyNoise(noise) if from == 0 => noise.range().middle(),
+        Act::Cascade(cascade) => (from..cascade.octaves.len())
+            .map(|i| cascade::middle(cascade, i))
+            .sum(),
+        _ => 0.0,
     }
 }
 

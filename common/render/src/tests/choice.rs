@@ -28,6 +28,7 @@ fn trials_that_end_early_find_what_whole_ones_find() {
                     let tried = Surface {
                         means,
                         looks: Looks::default(),
+                        coarse: None,
                         ..surface.clone()
                     };
                     (means, trial.costs(&[tried], f64::INFINITY)[0])

@@ -155,3 +155,29 @@ fn looking_behind_and_as_far_as_bends_say_need_fewer_evaluations() {
         );
     }
 }
+
+#[test]
+fn rays_far_from_the_surface_need_fewer_noises() {
+    let (surface, _, rays) = square(scenes::layers(), 100, 48);
+    assert!(surface.coarse.is_some());
+    let whole = Surface {
+        coarse: None,
+        ..surface.clone()
+    };
+    for goal in [Goal::Distance, Goal::Occlusion] {
+        let [(hits, coarse), (others, without)] = [&surface, &whole].map(|surface| {
+            let (mut tracer, mut counts, mut hits) = <(Tracer, Counts, Vec<Hit>)>::default();
+            let never = AtomicBool::new(false);
+            let done = tracer.trace(surface, goal, &rays, &never, &mut counts, &mut hits);
+            assert!(done.is_ok());
+            (hits, tracer.scratch.noise_evaluations)
+        });
+        // Where a ray is in shadow, any point will do.
+        let is_same = |(hit, other): (&Hit, &Hit)| match goal {
+            Goal::Distance => hit == other,
+            Goal::Occlusion => (*hit == Hit::None) == (*other == Hit::None),
+        };
+        assert!(hits.iter().zip(&others).all(is_same));
+        assert!(5 * coarse < 4 * without, "{goal:?}: {coarse} of {without}");
+    }
+}

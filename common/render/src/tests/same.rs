@@ -195,7 +195,7 @@ fn no_technique_of_the_tracer_changes_a_pixel() {
         let mut is_of_use = false;
         for (name, scene) in scenes::all()
             .into_iter()
-            .chain([("crags", scenes::crags())])
+            .chain([("crags", scenes::crags()), ("layers", scenes::layers())])
         {
             let settings = EvalSettings::default();
             let (reference, counts) = image(&scene, settings);

@@ -60,10 +60,20 @@ impl Fields {
 
 /// The thesis's hypertextured sphere (5.11).
 pub(super) fn hypertexture() -> Description {
+    under(&[(0.3, 4.0), (0.15, 8.0), (0.05, 16.0)])
+}
+
+/// A sphere under five layers, each half as high and as wide as the one before.
+pub(super) fn layers() -> Description {
+    under(&[0.2, 0.1, 0.05, 0.025, 0.0125].map(|amplitude| (amplitude, 0.8 / amplitude)))
+}
+
+/// A sphere under layers of noise of these amplitudes and frequencies.
+fn under(layers: &[(f64, f64)]) -> Description {
     let mut fields = Fields::new();
     let mut field = fields.sphere(1.0);
     let p = fields.position();
-    for (amplitude, frequency) in [(0.3, 4.0), (0.15, 8.0), (0.05, 16.0)] {
+    for &(amplitude, frequency) in layers {
         let factor = fields.number(frequency);
         let scaled = fields.op(Op::Scale, &[p, factor], &[]);
         let noise = fields.op(Op::Noise, &[scaled], &[3.0]);

@@ -28,6 +28,8 @@ pub(crate) struct Batch {
     pub(crate) value: Lanes,
     /// The value's derivative along the ray.
     pub(crate) slope: Lanes,
+    /// How many evaluations were of coarse surfaces.
+    pub(crate) coarse_evaluations: u64,
 }
 
 impl Default for Paths {
@@ -50,6 +52,7 @@ impl Default for Batch {
             footprint: [0.0; BATCH],
             value: [0.0; BATCH],
             slope: [0.0; BATCH],
+            coarse_evaluations: 0,
         }
     }
 }
@@ -140,6 +143,18 @@ impl Batch {
             &mut [&mut value[..n]],
         );
         self.value[..n].copy_from_slice(&value[..n]);
+        if surface.is_coarse() {
+            self.coarse_evaluations += n as u64;
+            for i in 0..n {
+                // One that is not finite says nothing about the surface's field.
+                let (value, moved) = (self.value[i], surface.clearances.at(self.distance[i]).moved);
+                self.value[i] = if value < f64::INFINITY {
+                    value - moved
+                } else {
+                    0.0
+                };
+            }
+        }
     }
 
     /// Evaluates the field at the places, and its derivative along the paths.

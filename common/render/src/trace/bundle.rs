@@ -11,6 +11,7 @@ use glam::DVec3;
 use super::batch::{Batch, Lanes, Paths};
 use super::bound;
 use super::clearance::{CAUTION, FLAT, Known, widened};
+use super::coarse;
 use super::means::Means;
 use super::surface::Surface;
 use super::tracer::Ray;
@@ -47,7 +48,7 @@ pub(crate) struct Span {
 #[derive(Default)]
 pub(crate) struct Bundles {
     paths: Paths,
-    batch: Batch,
+    pub(crate) batch: Batch,
     lanes: Vec<Lane>,
     at: Box<Rows>,
 }
@@ -111,18 +112,34 @@ impl Bundles {
         counts: &mut Counts,
     ) {
         for size in SIZES {
-            let mut first = 0;
-            loop {
-                while self.lanes.len() < BATCH && first < spans.len() {
-                    let count = size.min(spans.len() - first);
-                    self.start(surface, rays, &spans[first..first + count], first);
-                    first += count;
-                }
-                if self.lanes.is_empty() {
-                    break;
-                }
-                self.step(surface, spans, scratch, counts);
+            if let Some(coarse) = &surface.coarse {
+                self.follow(size, coarse, rays, spans, scratch, counts);
             }
+            self.follow(size, surface, rays, spans, scratch, counts);
+        }
+    }
+
+    /// Follows bundles of that many rays.
+    fn follow(
+        &mut self,
+        size: usize,
+        surface: &Surface,
+        rays: &[Ray],
+        spans: &mut [Span],
+        scratch: &mut Scratch,
+        counts: &mut Counts,
+    ) {
+        let mut first = 0;
+        loop {
+            while self.lanes.len() < BATCH && first < spans.len() {
+                let count = size.min(spans.len() - first);
+                self.start(surface, rays, &spans[first..first + count], first);
+                first += count;
+            }
+            if self.lanes.is_empty() {
+                break;
+            }
+            self.step(surface, spans, scratch, counts);
         }
     }
 
@@ -185,7 +202,8 @@ impl Bundles {
             let ahead = at.ahead[i];
             lane.steps += 1;
             at.t[i] += ahead;
-            if ahead > split * radius && at.t[i] <= lane.end && lane.steps < STEPS_MAX {
+            let is_near = surface.is_coarse() && !coarse::is_far(surface, batch, i);
+            if !is_near && ahead > split * radius && at.t[i] <= lane.end && lane.steps < STEPS_MAX {
                 continue;
             }
             counts.subdivisions += u64::from(at.t[i] <= lane.end);

@@ -2,8 +2,10 @@
 //!
 //! It decides how fast rays are traced and nothing else.
 
+use core::slice::from_ref;
 use std::sync::Arc;
 
+use super::coarse;
 use super::ground::{self, Ground};
 use super::means::{Means, Trial};
 use super::surface::{Looks, Surface};
@@ -13,11 +15,12 @@ use crate::view::View;
 
 impl Surface {
     /// The surface with the means by which the rays of `view` need least: those given, or the cheapest, with or without the
-    /// ground.
+    /// ground, and with the coarse surface that `with_coarse` adds where that pays.
     pub(crate) fn chosen(
         self,
         view: &View,
         ground: Option<Arc<Ground>>,
+        with_coarse: impl FnOnce(&Self) -> Option<Self>,
         given: Option<Means>,
         crew: &dyn Crew,
     ) -> Self {
@@ -64,7 +67,15 @@ impl Surface {
         if best.means == Means::Stretches && !best.walks() {
             return best.looking(&trial, cost);
         }
-        best
+        let is_stepped = matches!(best.means, Means::Values | Means::Tangents);
+        let is_tried = is_stepped && best.ground.is_none();
+        if !is_tried || !Technique::EarlyExit.is_used(best.without) {
+            return best;
+        }
+        match with_coarse(&best) {
+            Some(other) if trial.costs(from_ref(&other), cost)[0] < coarse::WORTH * cost => other,
+            _ => best,
+        }
     }
 
     /// Whether means say anything of this surface.

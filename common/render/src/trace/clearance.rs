@@ -1,6 +1,6 @@
 //! How far a ray may go from a place where the field has a known value.
 
-use field::{BATCH, Interval, Modulus, Program, Region, Surroundings, Taylor};
+use field::{BATCH, Cut, Interval, Modulus, Program, Region, Surroundings, Taylor};
 use glam::DVec3;
 use scene::description::{Bound, Seed};
 
@@ -88,11 +88,24 @@ pub(crate) struct Pick {
     pub(crate) slope: f64,
 }
 
+impl Pick {
+    /// How far the field is positive from a place where it has a value.
+    fn reach(&self, value: f64) -> f64 {
+        let slope = if self.slope > FLAT { self.slope } else { FLAT };
+        (value - self.offset) / slope
+    }
+}
+
 /// Bins of values, two to a factor of two: from 2⁻⁴⁸ to 2³².
 const BINS: usize = 160;
 
 /// The value at which the second bin begins, as the upper bits of an f64.
 const FIRST_BIN: u64 = (1023 - 48) << 1;
+
+/// A value a quarter into a bin.
+fn within(bin: usize) -> f64 {
+    f64::from_bits(((FIRST_BIN + bin as u64) << 51) | (1 << 49))
+}
 
 /// Bounds of a field's change around places at similar distances from the eye.
 #[derive(Clone, Debug)]
@@ -105,6 +118,10 @@ pub(crate) struct Clearance {
     pub(crate) errors: (f64, f64),
     /// The bounds hold no farther than this from the place, metres.
     pub(crate) reach: f64,
+    /// How far the surface's field may be below this one, of which noises were left out.
+    pub(crate) moved: f64,
+    /// Above this value it pays to go on by a coarse field, or by this one if it is that.
+    pub(crate) turn: f64,
 }
 
 /// A tangent that bounds nothing.
@@ -132,12 +149,8 @@ impl Clearance {
         };
         let picks = (0..BINS)
             .map(|bin| {
-                // A quarter into the bin.
-                let value = f64::from_bits(((FIRST_BIN + bin as u64) << 51) | (1 << 49));
-                let reach = |pick: &Pick| {
-                    let slope = if pick.slope > FLAT { pick.slope } else { FLAT };
-                    (value - pick.offset) / slope
-                };
+                let value = within(bin);
+                let reach = |pick: &Pick| pick.reach(value);
                 levels
                     .iter()
                     .copied()
@@ -155,7 +168,21 @@ impl Clearance {
                 .unwrap_or(NO_TANGENT),
             errors,
             reach,
+            moved: 0.0,
+            turn: f64::INFINITY,
         }
+    }
+
+    /// The least of the tabled values from which on a field of fewer noises reaches `gain` times as far; infinite if none does.
+    fn gains(&self, coarse: &Self, gain: f64) -> f64 {
+        let reaches = |value: &f64| {
+            let below = value - coarse.moved;
+            coarse.pick(below).reach(below) > gain * self.pick(*value).reach(*value)
+        };
+        (0..BINS)
+            .map(within)
+            .find(|value| *value > coarse.moved && reaches(value))
+            .unwrap_or(f64::INFINITY)
     }
 
     /// The bound that reaches farthest from a place where the field has that value.
@@ -183,6 +210,8 @@ pub(crate) struct Around<'a> {
     pub(crate) field: &'a Program,
     /// The field less its known part, if there is one.
     pub(crate) rest: Option<&'a Program>,
+    /// The program that this is without what is left out, and what that is.
+    pub(crate) cut: Option<(&'a Program, &'a Cut)>,
     /// Where the surface can be.
     pub(crate) bound: &'a Bound,
     /// What the field is split along.
@@ -225,6 +254,15 @@ impl Clearances {
         }
     }
 
+    /// Bounds that say where to go over to `coarse` ones, where these reach `there` times as far, and these where to come `back`.
+    pub(crate) fn turning(mut self, mut coarse: Self, there: f64, back: f64) -> [Self; 2] {
+        for (whole, coarse) in self.tables.iter_mut().zip(&mut coarse.tables) {
+            whole.turn = whole.gains(coarse, there);
+            coarse.turn = whole.gains(coarse, back) - coarse.moved;
+        }
+        [self, coarse]
+    }
+
     /// The bounds for places at that distance from the eye.
     #[inline]
     pub(crate) fn at(&self, distance: f64) -> &Clearance {
@@ -238,12 +276,7 @@ impl Clearances {
 impl Around<'_> {
     /// Bounds for places between two distances from the eye, to be used up to `reach` from them.
     fn table(&self, near: f64, far: f64, reach: f64) -> Clearance {
-        let surroundings = Surroundings {
-            region: self.region(far),
-            footprint: Interval::new(self.footprint.at(near), self.footprint.at(far)),
-            time: self.time,
-            footprint_slope: self.footprint.angle,
-        };
+        let surroundings = self.between(near, far);
         let bounds = |program: &Program| {
             let mut modulus = program.modulus(&surroundings);
             if !Technique::Levels.is_used(self.without) {
@@ -252,13 +285,31 @@ impl Around<'_> {
             modulus
         };
         let whole = bounds(self.field);
-        let tangent = self.field.taylor(&surroundings);
-        match (self.rest, whole.levels.first()) {
+        let (tangent, moved) = match self.cut {
+            Some((uncut, cut)) => (None, uncut.moved_by(cut, &surroundings)),
+            None => (self.field.taylor(&surroundings), 0.0),
+        };
+        let clearance = match (self.rest, whole.levels.first()) {
             (Some(rest), Some(finest)) => {
                 let rest = bounds(rest);
                 Clearance::new(&rest, finest.offset, tangent, reach)
             }
             _ => Clearance::new(&whole, 0.0, tangent, reach),
+        };
+        Clearance { moved, ..clearance }
+    }
+
+    /// All that a field is asked about.
+    pub(crate) fn everywhere(&self) -> Surroundings {
+        self.between(0.0, FAR)
+    }
+
+    fn between(&self, near: f64, far: f64) -> Surroundings {
+        Surroundings {
+            region: self.region(far),
+            footprint: Interval::new(self.footprint.at(near), self.footprint.at(far)),
+            time: self.time,
+            footprint_slope: self.footprint.angle,
         }
     }
 

@@ -211,8 +211,13 @@ fn cost(surface: Surface, rays: &[Ray], steps_max: f64, limit: f64) -> f64 {
         return f64::INFINITY;
     }
     let steps = counts.steps as f64;
-    let values = (counts.evaluations as f64 - steps) + steps * surface.means.cost_for(&surface);
-    values / rays.len() as f64
+    let step_cost = surface.means.cost_for(&surface);
+    let values = (counts.evaluations as f64 - steps) + steps * step_cost;
+    let spared = surface.coarse.as_ref().map_or(0.0, |coarse| {
+        let [together, alone] = tracer.coarse_evaluations();
+        together * (1.0 - coarse.cost) + alone * (step_cost - coarse.cost)
+    });
+    (values - spared) / rays.len() as f64
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.

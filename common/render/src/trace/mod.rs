@@ -10,6 +10,7 @@ pub(crate) mod bracket;
 pub(crate) mod bundle;
 mod choice;
 mod clearance;
+mod coarse;
 pub(crate) mod grid;
 pub(crate) mod ground;
 pub(crate) mod means;

@@ -18,6 +18,7 @@ use super::batch::{Batch, Paths};
 use super::bound;
 use super::bracket::End;
 use super::bundle::Span;
+use super::coarse;
 use super::grid::Steps;
 use super::means::Means;
 use super::polish::Found;
@@ -35,7 +36,7 @@ pub(crate) const STEPS_MAX: f64 = 4_194_304.0;
 pub(crate) struct Search {
     rays: Vec<Lane>,
     paths: Paths,
-    batch: Batch,
+    pub(crate) batch: Batch,
     rows: Box<Rows>,
 }
 
@@ -48,7 +49,8 @@ struct Lane {
     pause: f64,
 }
 
-/// When rays pause in their search, to be led on by what costs less, and those that did.
+/// When rays pause in their search, to be led on by what costs less, and those that did. They also do where they come
+/// far from a surface that has a coarse one, and near on that.
 pub(crate) struct Pause<'a> {
     /// After so many evaluations of a round.
     pub(crate) after: f64,
@@ -57,7 +59,7 @@ pub(crate) struct Pause<'a> {
 
 impl Search {
     /// Searches along every span until the ray is done or pauses. Rays that find a point inside go to `found`, which gets the memory
-    /// of evaluations and the counts with them; for those that need no more, `hits` has the answer.
+    /// of evaluations and the counts with them; for those that need no more, `hits` has the answer. On a coarse surface nothing is found.
     pub(crate) fn run(
         &mut self,
         Wanted {
@@ -80,6 +82,8 @@ impl Search {
             Goal::Distance => surface.looks,
             Goal::Occlusion => Looks::default(),
         };
+        let is_coarse = surface.is_coarse();
+        let turns = is_coarse || surface.coarse.is_some();
         let mut waiting = spans.iter();
         loop {
             while self.rays.len() < BATCH {
@@ -101,12 +105,20 @@ impl Search {
             for i in (0..n).rev() {
                 let rows = &self.rows;
                 counts.backtracks += u64::from(rows.back[i] > 0.0);
-                let is_found = rows.clear[i] >= rows.inside[i];
-                let is_exhausted = rows.count[i] > surface.steps_max;
+                let is_found = !is_coarse && rows.clear[i] >= rows.inside[i];
+                let is_exhausted = !is_coarse && rows.count[i] > surface.steps_max;
                 if !is_found && !is_exhausted && rows.clear[i] <= rows.end[i] {
                     let lane = &self.rays[i];
-                    // Whoever knows a point inside is about to find the first.
-                    if rows.count[i] >= lane.pause && rows.inside[i] == f64::INFINITY {
+                    let is_due = rows.count[i] >= lane.pause;
+                    let is_far = turns && coarse::is_far(surface, &self.batch, i);
+                    // Whoever knows a point inside is about to find the first, but not on a surface that is below.
+                    let knows_inside = rows.inside[i] < f64::INFINITY;
+                    let pauses = if is_coarse {
+                        is_due || !is_far || knows_inside
+                    } else {
+                        (is_due || is_far) && !knows_inside
+                    };
+                    if pauses {
                         pause.spans.push(Span {
                             ray: lane.ray,
                             clear: rows.clear[i],

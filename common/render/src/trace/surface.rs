@@ -8,6 +8,7 @@ use scene::Description;
 use scene::description::{Bound, Seed};
 
 use super::clearance::{Around, Clearances};
+use super::coarse;
 use super::grid::Grid;
 use super::ground::{Ground, Site};
 use super::means::Means;
@@ -52,6 +53,10 @@ pub(crate) struct Surface {
     pub(crate) moves: bool,
     /// Where heights are tabled above which nothing need be looked at.
     pub(crate) ground: Option<Arc<Ground>>,
+    /// The surface without half of its noises, where it pays to follow that.
+    pub(crate) coarse: Option<Arc<Self>>,
+    /// What an evaluation costs, over one of the whole field: less if this is a coarse one.
+    pub(crate) cost: f64,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
     /// How camera rays look along themselves.
@@ -118,6 +123,7 @@ impl Surface {
         let around = Around {
             field: &program,
             rest: rest.as_ref(),
+            cut: None,
             bound: &surface.bound,
             seed: &surface.seed,
             footprint,
@@ -153,13 +159,15 @@ impl Surface {
         let surface = Self {
             moves: program.moves(),
             ground: None,
+            coarse: None,
+            cost: 1.0,
             means: Means::Values,
             looks: Looks::default(),
             steps_max: STEPS_MAX,
             evaluations_max: u64::MAX,
             is_partial: false,
             without,
-            program,
+            program: program.clone(),
             level,
             clearances,
             bound: surface.bound,
@@ -167,7 +175,13 @@ impl Surface {
             footprint,
             sight,
         };
-        Ok(surface.chosen(view, ground, means, crew))
+        let with_coarse = |surface: &Self| coarse::with(surface, &around, nearest, crew);
+        Ok(surface.chosen(view, ground, with_coarse, means, crew))
+    }
+
+    /// Whether noises are left out of its field: then that is below the surface's.
+    pub(crate) fn is_coarse(&self) -> bool {
+        self.cost < 1.0
     }
 
     /// Whether single rays walk as far as they are outside in one step.

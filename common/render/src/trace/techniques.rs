@@ -21,6 +21,8 @@ pub enum Technique {
     Growth,
     /// Fine octaves count as a range far from the surface, and as a slope near it.
     Levels,
+    /// Far from the surface only the coarse noises are evaluated: Worley and Hart's early exit.
+    EarlyExit,
     /// Bounds are tabled by the distance from the eye, where footprints cut octaves off.
     Distances,
     /// What of the field cannot matter to the rays of a few pixels is left out of their program.
@@ -37,7 +39,7 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Bundles,
         Self::Tangents,
         Self::Stretches,
@@ -46,6 +48,7 @@ impl Technique {
         Self::Foresight,
         Self::Growth,
         Self::Levels,
+        Self::EarlyExit,
         Self::Distances,
         Self::Choices,
         Self::Ground,
@@ -65,6 +68,7 @@ impl Technique {
             Self::Foresight => "foresight",
             Self::Growth => "known growth",
             Self::Levels => "levels by value",
+            Self::EarlyExit => "early exit",
             Self::Distances => "tables by distance",
             Self::Choices => "simplified programs",
             Self::Ground => "clear ground",

@@ -105,6 +105,12 @@ pub(crate) struct Tracer {
 }
 
 impl Tracer {
+    /// How many evaluations were of coarse surfaces since this was last asked: of bundles, and of single rays.
+    pub(crate) fn coarse_evaluations(&mut self) -> [f64; 2] {
+        [&mut self.bundles.batch, &mut self.search.batch]
+            .map(|batch| core::mem::take(&mut batch.coarse_evaluations) as f64)
+    }
+
     /// Traces `rays` and appends what they meet to `hits`, in their order.
     ///
     /// Rays that stand next to each other should lie close to each other: that is
@@ -199,6 +205,8 @@ impl Tracer {
         let mut after = if goes_back { ROUND } else { f64::INFINITY };
         // Close to the surface, where rays towards the sun begin, cells of the ground say nothing.
         let mut is_near = goal == Goal::Occlusion;
+        // Bundles end near the surface; rays that come far from it again follow the coarse one.
+        let mut is_first = true;
         loop {
             if let Some(ground) = ground.filter(|_| !is_near) {
                 stopwatch.begin(part(Part::Bundles));
@@ -210,7 +218,7 @@ impl Tracer {
                 ground.lead(bounds, rays, spans, wanted.cancel)?;
             }
             stopwatch.begin(part(Part::Search));
-            let found = |found: Found, results: Results<'_>| {
+            let mut found = |found: Found, results: Results<'_>| {
                 let found = if surface.is_partial {
                     found.without_outside()
                 } else {
@@ -222,6 +230,24 @@ impl Tracer {
                     stopwatch.begin(part(Part::Search));
                 }
             };
+            if let Some(coarse) = surface.coarse.as_deref().filter(|_| !is_first) {
+                paused.clear();
+                let pause = Pause {
+                    after: surface.steps_max,
+                    spans: paused,
+                };
+                let results = Results {
+                    scratch,
+                    counts,
+                    hits,
+                };
+                let wanted = Wanted {
+                    surface: coarse,
+                    ..wanted
+                };
+                search.run(wanted, spans, pause, results, &mut found)?;
+                std::mem::swap(spans, paused);
+            }
             let results = Results {
                 scratch,
                 counts,
@@ -234,15 +260,16 @@ impl Tracer {
             };
             match surface.means {
                 Means::Ranges(arithmetic) => {
-                    ranges.run(wanted, arithmetic, spans, results, found)?
+                    ranges.run(wanted, arithmetic, spans, results, &mut found)?
                 }
-                _ => search.run(wanted, spans, pause, results, found)?,
+                _ => search.run(wanted, spans, pause, results, &mut found)?,
             }
             if paused.is_empty() {
                 break;
             }
             std::mem::swap(spans, paused);
             is_near = false;
+            is_first = false;
             after *= 2.0;
         }
         stopwatch.begin(part(Part::Polish));

@@ -36,6 +36,16 @@ impl Part {
         }
     }
 
+    /// Where it counts as `middle` instead.
+    fn left_out(self, middle: f64) -> Self {
+        let range = self.range.hull(Interval::point(middle));
+        let most = larger(range.high - middle, middle - range.low);
+        Self {
+            range,
+            change: Change::new(most, 0.0).rounded(range.magnitude(), 4.0),
+        }
+    }
+
     fn raised(self, by: f64) -> Self {
         let range = self.range.add(Interval::point(by));
         Self {
@@ -70,6 +80,19 @@ fn ridge(offset: f64, noise: Part) -> Part {
     }
 }
 
+/// What stands for an octave that is left out: the middle of what it can be, where octaves are added by themselves.
+pub(super) fn middle(cascade: &Cascade, i: usize) -> f64 {
+    let Model::Sum(basis) = cascade.model else {
+        return 0.0;
+    };
+    let octave = &cascade.octaves[i];
+    let noise = Part {
+        range: octave.noise.as_ref().map_or(NOISE, Noise::range),
+        change: Change::NONE,
+    };
+    shaped(basis, noise).range.middle() * octave.amplitude
+}
+
 impl Pass<'_> {
     pub(super) fn cascade(&mut self, cascade: &Cascade, at: &Bound) -> Bound {
         let zero = Interval::point(0.0);
@@ -78,9 +101,10 @@ impl Pass<'_> {
             change: Change::NONE,
         };
         let mut rest = total;
+        let keeps = self.keeps();
         for (i, octave) in cascade.octaves.iter().enumerate() {
             let weight = self.weight(cascade, i);
-            if weight.range.high <= 0.0 {
+            if weight.range.high <= 0.0 && keeps >= cascade.octaves.len() {
                 break;
             }
             let noise = Part {
@@ -88,15 +112,23 @@ impl Pass<'_> {
                 change: self.octave(octave, at),
             };
             let amplitude = octave.amplitude;
+            let held = |octave: Part| {
+                if i < keeps {
+                    octave
+                } else {
+                    octave.left_out(middle(cascade, i))
+                }
+            };
             match cascade.model {
                 Model::Sum(basis) => {
                     let octave = self.times(shaped(basis, noise), weight).scaled(amplitude);
-                    total = self.plus(total, octave);
+                    total = self.plus(total, held(octave));
                 }
                 Model::AltitudeOne { basis, xi } => {
                     let octave = self
                         .times(shaped(basis, noise).raised(xi), weight)
                         .scaled(amplitude);
+                    let octave = held(octave);
                     total = if i == 0 {
                         octave
                     } else {
@@ -106,12 +138,13 @@ impl Pass<'_> {
                 Model::AltitudeTwo { basis, xi } => {
                     let raised = shaped(basis, noise).raised(xi).scaled(amplitude);
                     if i == 0 {
-                        total = self.times(raised, weight);
+                        let octave = self.times(raised, weight);
+                        total = held(octave);
                         rest.range = Interval::point(1.0);
                     } else {
                         rest = self.clamped(rest, raised);
                         let octave = self.times(rest, weight);
-                        total = self.plus(total, octave);
+                        total = self.plus(total, held(octave));
                     }
                 }
                 Model::Ridged { offset, gain } => {
@@ -119,11 +152,11 @@ impl Pass<'_> {
                     rest = if i == 0 {
                         ridge
                     } else {
-                        let held = self.clamped(rest.scaled(gain), ONE);
-                        self.times(held, ridge)
+                        let gained = self.clamped(rest.scaled(gain), ONE);
+                        self.times(gained, ridge)
                     };
                     let octave = self.times(rest, weight).scaled(amplitude);
-                    total = self.plus(total, octave);
+                    total = self.plus(total, held(octave));
                 }
             }
         }
