@@ -59,8 +59,9 @@ pub(crate) struct Pause<'a> {
 
 impl Search {
     /// Searches along every span until the ray is done or pauses. Rays that find a point inside go to `found`, which gets the memory
-    /// of evaluations and the counts with them; for those that need no more, `hits` has the answer. On a coarse surface nothing is found.
-    pub(crate) fn run(
+    /// of evaluations and the counts with them; for those that need no more, `hits` has the answer. On a coarse surface nothing is
+    /// found. With `TURNS`, rays pause where another surface serves them better: one that has or is a coarse one must be followed so.
+    pub(crate) fn run<const TURNS: bool>(
         &mut self,
         Wanted {
             surface,
@@ -82,8 +83,7 @@ impl Search {
             Goal::Distance => surface.looks,
             Goal::Occlusion => Looks::default(),
         };
-        let is_coarse = surface.is_coarse();
-        let turns = is_coarse || surface.coarse.is_some();
+        let is_coarse = TURNS && surface.is_coarse();
         let mut waiting = spans.iter();
         loop {
             while self.rays.len() < BATCH {
@@ -110,13 +110,13 @@ impl Search {
                 if !is_found && !is_exhausted && rows.clear[i] <= rows.end[i] {
                     let lane = &self.rays[i];
                     let is_due = rows.count[i] >= lane.pause;
-                    let is_far = turns && coarse::is_far(surface, &self.batch, i);
                     // Whoever knows a point inside is about to find the first, but not on a surface that is below.
                     let knows_inside = rows.inside[i] < f64::INFINITY;
+                    let is_far = || coarse::is_far(surface, &self.batch, i);
                     let pauses = if is_coarse {
-                        is_due || !is_far || knows_inside
+                        is_due || knows_inside || !is_far()
                     } else {
-                        (is_due || is_far) && !knows_inside
+                        !knows_inside && (is_due || TURNS && is_far())
                     };
                     if pauses {
                         pause.spans.push(Span {

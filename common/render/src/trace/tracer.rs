@@ -245,7 +245,7 @@ impl Tracer {
                     surface: coarse,
                     ..wanted
                 };
-                search.run(wanted, spans, pause, results, &mut found)?;
+                search.run::<true>(wanted, spans, pause, results, &mut found)?;
                 std::mem::swap(spans, paused);
             }
             let results = Results {
@@ -262,7 +262,10 @@ impl Tracer {
                 Means::Ranges(arithmetic) => {
                     ranges.run(wanted, arithmetic, spans, results, &mut found)?
                 }
-                _ => search.run(wanted, spans, pause, results, &mut found)?,
+                _ if surface.coarse.is_some() => {
+                    search.run::<true>(wanted, spans, pause, results, &mut found)?
+                }
+                _ => search.run::<false>(wanted, spans, pause, results, &mut found)?,
             }
             if paused.is_empty() {
                 break;
