@@ -143,12 +143,14 @@ fn corner(row: u32, z: u32) -> u32 {
 }
 
 /// The hash of a lattice point.
+#[inline(always)]
 pub(crate) fn node_hash(lattice: Lattice, [x, y, z]: [u32; 3]) -> u32 {
     let row = hash::absorb(hash::absorb(lattice.0, x), y);
     corner(row, z)
 }
 
 /// The gradient that a lattice point's hash stands for: two components are ±1, one is 0.
+#[inline(always)]
 pub(crate) fn gradient_of(hash: u32) -> [f64; 3] {
     let mut gradient = [0.0; 3];
     add_gradient(&mut gradient, hash, 1.0);

@@ -85,6 +85,7 @@ fn node<R: Real>(corner: Corner, hash: u32, x: R, y: R, z: R) -> R {
 }
 
 /// ξ₀ and ξ of a lattice point, from its hash; 0 for what the noise does not have.
+#[inline(always)]
 pub(crate) fn parts(corner: Corner, hash: u32) -> (f64, [f64; 3]) {
     let own = || f64::from(height(hash::finish_high(hash::absorb(hash, 1))));
     match corner {

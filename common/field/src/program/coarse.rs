@@ -112,7 +112,7 @@ impl Plan {
         }
         let roots = self.roots.iter().map(|&root| now[root]).collect();
         let steps = steps.steps;
-        Self { steps, roots }.live()
+        Self::live(steps, roots)
     }
 }
 

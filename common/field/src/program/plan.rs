@@ -61,6 +61,9 @@ pub(crate) struct Step {
 pub(crate) struct Plan {
     pub(crate) steps: Vec<Step>,
     pub(crate) roots: Vec<usize>,
+    /// Where the numbers of each step begin if all stand one after another, and how many there are.
+    pub(crate) places: Vec<usize>,
+    pub(crate) numbers: usize,
 }
 
 impl Plan {
@@ -91,35 +94,45 @@ impl Plan {
             known.push(fact);
         }
         let roots = roots.iter().map(|root| root.index()).collect();
-        Ok(Self { steps, roots }.live())
+        Ok(Self::live(steps, roots))
     }
 
-    /// The same plan without the steps that no root needs.
-    pub(crate) fn live(self) -> Self {
-        let mut needed = vec![false; self.steps.len()];
-        for &root in &self.roots {
+    /// The steps that a root needs.
+    pub(crate) fn live(all: Vec<Step>, roots: Vec<usize>) -> Self {
+        let mut needed = vec![false; all.len()];
+        for &root in &roots {
             needed[root] = true;
         }
-        for (i, step) in self.steps.iter().enumerate().rev() {
+        for (i, step) in all.iter().enumerate().rev() {
             if needed[i] {
                 for &arg in &step.args {
                     needed[arg] = true;
                 }
             }
         }
-        let mut place = vec![0; self.steps.len()];
-        let mut steps = Vec::new();
-        for (i, mut step) in self.steps.into_iter().enumerate() {
+        let mut place = vec![0; all.len()];
+        let (mut steps, mut places, mut numbers) = (Vec::new(), Vec::new(), 0);
+        for (i, mut step) in all.into_iter().enumerate() {
             if needed[i] {
                 place[i] = steps.len();
                 for arg in &mut step.args {
                     *arg = place[*arg];
                 }
+                places.push(numbers);
+                numbers += match step.kind {
+                    Kind::Scalar => 1,
+                    Kind::Vector => 3,
+                };
                 steps.push(step);
             }
         }
-        let roots = self.roots.into_iter().map(|root| place[root]).collect();
-        Self { steps, roots }
+        let roots = roots.into_iter().map(|root| place[root]).collect();
+        Self {
+            steps,
+            roots,
+            places,
+            numbers,
+        }
     }
 }
 

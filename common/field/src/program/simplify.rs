@@ -200,7 +200,7 @@ impl Plan {
             steps.push(step);
         }
         let roots = self.roots.iter().map(|&root| now[root]).collect();
-        Self { steps, roots }.live()
+        Self::live(steps, roots)
     }
 }
 

@@ -5,6 +5,7 @@ use crate::cascade::{self, Carried, Cascade, Model, Term};
 use crate::interval::Interval;
 use crate::noise::{Noise, simplex};
 use crate::number::Number;
+use crate::op::Kind;
 use crate::program::Program;
 use crate::program::plan::{Act, Plan, Step};
 use crate::range::function::Function;
@@ -91,28 +92,6 @@ impl Cell {
     }
 }
 
-/// A number or a vector.
-#[derive(Clone)]
-enum Value<T> {
-    Scalar(T),
-    Vector([T; 3]),
-}
-
-impl<T: Clone> Value<T> {
-    fn scalar(&self) -> T {
-        match self {
-            Self::Scalar(value) | Self::Vector([value, ..]) => value.clone(),
-        }
-    }
-
-    fn vector(&self) -> [T; 3] {
-        match self {
-            Self::Vector(value) => value.clone(),
-            Self::Scalar(value) => [value.clone(), value.clone(), value.clone()],
-        }
-    }
-}
-
 /// What a walk over a plan stands on.
 struct Ground<T> {
     at: [T; 3],
@@ -120,40 +99,83 @@ struct Ground<T> {
     time: T,
 }
 
+/// What a plan's steps have given: their numbers one after another, as the plan places them.
+struct Values<'a, T> {
+    plan: &'a Plan,
+    numbers: Vec<T>,
+}
+
+impl<T: Arithmetic> Values<'_, T> {
+    /// A step's number, or the first component of its vector.
+    #[inline]
+    fn scalar(&self, step: usize) -> T {
+        self.numbers[self.plan.places[step]].clone()
+    }
+
+    /// A step's vector, or its number three times.
+    #[inline]
+    fn vector(&self, step: usize) -> [T; 3] {
+        let place = self.plan.places[step];
+        match (self.plan.steps[step].kind, &self.numbers[place..]) {
+            (Kind::Vector, [x, y, z, ..]) => [x.clone(), y.clone(), z.clone()],
+            _ => [self.scalar(step), self.scalar(step), self.scalar(step)],
+        }
+    }
+}
+
+/// What a step gives: a number or a vector.
+enum Value<T> {
+    Scalar(T),
+    Vector([T; 3]),
+}
+
 impl<T: Arithmetic> Ground<T> {
     /// The value of every step of a plan.
-    fn all(&self, plan: &Plan) -> Vec<Value<T>> {
-        let mut values: Vec<Value<T>> = Vec::with_capacity(plan.steps.len());
+    fn all<'a>(&self, plan: &'a Plan) -> Values<'a, T> {
+        let mut values = Values {
+            plan,
+            numbers: Vec::with_capacity(plan.numbers),
+        };
         for step in &plan.steps {
-            let value = self.step(step, &values);
-            values.push(value);
+            match self.step(step, &values) {
+                Value::Scalar(number) => values.numbers.push(number),
+                Value::Vector(vector) => values.numbers.extend(vector),
+            }
         }
         values
     }
 
     /// The value of the plan's first root; a plan without one is nowhere inside.
     fn first(&self, plan: &Plan) -> T {
-        let values = self.all(plan);
         match plan.roots.first() {
-            Some(&root) => values[root].scalar(),
+            Some(&root) => self.all(plan).scalar(root),
             None => T::constant(f64::INFINITY),
         }
     }
 
-    fn step(&self, step: &Step, values: &[Value<T>]) -> Value<T> {
-        let s = |i: usize| values[step.args[i]].scalar();
-        let v = |i: usize| values[step.args[i]].vector();
+    #[inline]
+    fn step(&self, step: &Step, values: &Values<'_, T>) -> Value<T> {
+        let s = |i: usize| values.scalar(step.args[i]);
+        let v = |i: usize| values.vector(step.args[i]);
         let number = match &step.act {
-            Act::ConstantVector(value) => return Value::Vector(value.map(T::constant)),
+            Act::ConstantVector(value) => return Value::Vector(each(*value, T::constant)),
             Act::Position => return Value::Vector(self.at.clone()),
             Act::Vector => return Value::Vector([s(0), s(1), s(2)]),
             Act::VectorAdd => return Value::Vector(pairs(v(0), v(1), T::plus)),
             Act::VectorSub => return Value::Vector(pairs(v(0), v(1), T::minus)),
-            Act::Scale => return Value::Vector(v(0).map(|part| part.mul(s(1)))),
+            Act::Scale => {
+                let factor = s(1);
+                return Value::Vector(each(v(0), |part| part.mul(factor.clone())));
+            }
             Act::OntoSphere(radius) => return Value::Vector(onto_sphere(*radius, v(0))),
             Act::OntoPlane => {
                 let [x, y, _] = v(0);
                 return Value::Vector([x, y, T::constant(0.0)]);
+            }
+            Act::NoiseGradient(noise) => {
+                let slopes = T::noise_slopes(noise, skewed(noise, v(0)));
+                // The skewing is symmetric: it is its own transpose.
+                return Value::Vector(skewed(noise, slopes));
             }
             Act::Constant(value) => T::constant(*value),
             Act::Time => self.time.clone(),
@@ -169,11 +191,6 @@ impl<T: Arithmetic> Ground<T> {
             Act::Power(exponent) => s(0).power(*exponent),
             Act::SmoothStep(low, high) => s(0).apply(Function::SmoothStep(*low, *high)),
             Act::Select => s(0).select(s(1), s(2)),
-            Act::NoiseGradient(noise) => {
-                let slopes = T::noise_slopes(noise, skewed(noise, v(0)));
-                // The skewing is symmetric: it is its own transpose.
-                return Value::Vector(skewed(noise, slopes));
-            }
             Act::Noise(lattice) => T::noise(*lattice, v(0)),
             Act::Shape(shape) => match step.args[..] {
                 [_, _] => T::shape(shape, [s(0), s(1), T::constant(0.0)]),
@@ -187,6 +204,13 @@ impl<T: Arithmetic> Ground<T> {
     }
 }
 
+/// `f` of each component. An array's own `map` goes through memory.
+#[inline(always)]
+fn each<T, U>([a, b, c]: [T; 3], f: impl Fn(T) -> U) -> [U; 3] {
+    [f(a), f(b), f(c)]
+}
+
+#[inline(always)]
 fn pairs<T>([a, b, c]: [T; 3], [x, y, z]: [T; 3], f: impl Fn(T, T) -> T) -> [T; 3] {
     [f(a, x), f(b, y), f(c, z)]
 }
@@ -254,7 +278,7 @@ fn skewed<T: Number>(noise: &Noise, at: [T; 3]) -> [T; 3] {
 
 /// Where an octave looks.
 fn look<T: Arithmetic>(octave: &cascade::Octave, at: &[T; 3]) -> [T; 3] {
-    [0, 1, 2].map(|axis| {
+    each([0, 1, 2], |axis: usize| {
         let [a, b, c] = octave.matrix[axis];
         let [x, y, z] = at.clone();
         x.times(a)
@@ -275,8 +299,10 @@ fn add<T: Number>(model: Model, term: Term, noise: T, carried: Carried<T>) -> Ca
 
 impl Segment {
     fn ground<T: Arithmetic>(&self, t: &T) -> Ground<T> {
-        let at = [0, 1, 2]
-            .map(|axis| T::constant(self.origin[axis]).plus(t.clone().times(self.direction[axis])));
+        let along = |axis: usize| {
+            T::constant(self.origin[axis]).plus(t.clone().times(self.direction[axis]))
+        };
+        let at = [along(0), along(1), along(2)];
         Ground {
             at,
             footprint: self.footprint,
@@ -377,7 +403,8 @@ impl Program {
 
     /// The first component of every step over a cell.
     pub(crate) fn steps_over_cell(&self, cell: &Cell) -> Vec<Reduced<3>> {
-        let all = cell.ground().all(&self.plan);
-        all.iter().map(Value::scalar).collect()
+        let values = cell.ground().all(&self.plan);
+        let steps = 0..self.plan.steps.len();
+        steps.map(|step| values.scalar(step)).collect()
     }
 }

@@ -3,10 +3,13 @@
 use crate::arithmetic::Unary;
 use crate::curve::Curve;
 use crate::interval::{Interval, larger, smaller};
+use crate::noise::Lattice;
+use crate::noise::lattice::Corner;
 use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::{Band, Function};
 use crate::range::interval::curve_over;
+use crate::range::noise;
 
 /// Room for the rounding of one operation on forms, of the magnitudes that go into it.
 pub(crate) const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -32,6 +35,11 @@ pub(crate) trait Form: Clone {
     fn with_error(self, error: f64) -> Self;
     /// Condensed to the symbols of the inputs, thesis eq. (5.18).
     fn condensed(self, inputs: &[Self; 3]) -> Self;
+
+    /// The exact sum of a lattice noise's kernels; `None` where a place is too far or too wide.
+    fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
+        noise::lattice::sum(corner, lattice, at)
+    }
 }
 
 /// Any number between two forms: their mean, give or take half of their difference.
@@ -267,5 +275,9 @@ impl<F: Form> Arithmetic for F {
 
     fn settled(self, inputs: &[Self; 3]) -> Self {
         self.condensed(inputs)
+    }
+
+    fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
+        F::kernels(corner, lattice, at)
     }
 }

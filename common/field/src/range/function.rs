@@ -75,6 +75,9 @@ pub(crate) struct Band {
 /// More than one rounding of a result relative to it, twice over: for the values and for the line.
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 
+/// Room for the rounding of the quintic: sums of terms up to 15 that end near 0.
+const QUINTIC_SLACK: f64 = 2e-14;
+
 /// A whole turn, a little less, so that no interval longer than it is called shorter.
 const TURN: f64 = std::f64::consts::TAU * (1.0 - 1e-9);
 
@@ -295,10 +298,20 @@ impl Function {
     }
 
     /// The line that the function stays closest to over `a`, through the slope of its chord, and how close; `None` if there is none.
+    #[inline]
     pub(crate) fn band(self, a: Interval) -> Option<Band> {
-        if let Self::Profile(profile) = self {
-            return profile.band(a);
+        let finite = a.low.is_finite() && a.high.is_finite();
+        match self {
+            Self::Profile(profile) => profile.band(a),
+            Self::Quintic => finite.then(|| quintic_band(a)),
+            Self::Square => square_band(a),
+            Self::Unary(Unary::Sqrt) if a.low > 0.0 => sqrt_band(a),
+            _ => self.chord_band(a),
         }
+    }
+
+    /// The same for any function whose extremes beside a line are known.
+    fn chord_band(self, a: Interval) -> Option<Band> {
         let broken = match self {
             Self::Reciprocal => a.low <= 0.0 && a.high >= 0.0,
             Self::OntoSphere(_) => a.low <= 0.0,
@@ -317,14 +330,7 @@ impl Function {
             0.0
         };
         let (low, high) = self.extremes(alpha, a);
-        let size = larger(low.abs(), high.abs()) + 2.0 * alpha.abs() * reach;
-        let delta = 0.5 * (high - low) + ROUNDING * size + self.slack();
-        let band = Band {
-            alpha,
-            beta: 0.5 * (low + high),
-            delta,
-        };
-        (alpha.is_finite() && band.beta.is_finite() && delta.is_finite()).then_some(band)
+        Band::around(alpha, low, high, reach, self.slack())
     }
 
     /// The least and the greatest of φ(t) − αt over `a`.
@@ -352,7 +358,7 @@ impl Function {
     fn level(self, alpha: f64, a: Interval) -> Places {
         let none = Places::none();
         match self {
-            Self::Unary(Unary::Neg) | Self::Profile(_) => none,
+            Self::Unary(Unary::Neg) | Self::Profile(_) | Self::Quintic => none,
             Self::Unary(Unary::Abs) => none.and(0.0),
             Self::Unary(Unary::Sqrt) => none.and(0.0).and(0.25 / (alpha * alpha)),
             Self::Unary(Unary::Exp) => none.and(libm::log(alpha)),
@@ -378,29 +384,91 @@ impl Function {
                 none.and(there).and(-there)
             }
             Self::OntoSphere(radius) => none.and((radius / -alpha).sqrt()),
-            Self::Quintic => {
-                // 30(t(1 − t))² = |α|, on the side where the sign is α's.
-                let s = (alpha.abs() / 30.0).sqrt();
-                let root = larger(1.0 - 4.0 * s, 0.0).sqrt();
-                let side = if alpha > 0.0 { -0.5 } else { 0.5 };
-                none.and(0.0)
-                    .and(1.0)
-                    .and(-1.0)
-                    .and(side * (1.0 - root))
-                    .and(side * (1.0 + root))
-            }
         }
     }
 
     /// How far a computed value may be from the exact one beyond eight units in its last place.
     fn slack(self) -> f64 {
         match self {
-            // Sums of terms up to 15 that end near 0.
-            Self::Quintic => 2e-14,
+            Self::Quintic => QUINTIC_SLACK,
             Self::SmoothStep(..) => 4e-15,
             Self::Unary(Unary::Sin | Unary::Cos) => 1e-15,
             _ => 0.0,
         }
+    }
+}
+
+impl Band {
+    /// The line of slope `alpha` midway between the extremes of φ(t) − αt over numbers up to `reach`; `None` beyond all numbers.
+    #[inline(always)]
+    fn around(alpha: f64, low: f64, high: f64, reach: f64, slack: f64) -> Option<Self> {
+        let size = larger(low.abs(), high.abs()) + 2.0 * alpha.abs() * reach;
+        let beta = 0.5 * (low + high);
+        let delta = 0.5 * (high - low) + ROUNDING * size + slack;
+        let finite = alpha.is_finite() && beta.is_finite() && delta.is_finite();
+        finite.then_some(Self { alpha, beta, delta })
+    }
+}
+
+/// The band of a²: its chord's slope is the sum of the ends, and it is farthest from the chord midway.
+#[inline]
+fn square_band(a: Interval) -> Option<Band> {
+    let alpha = a.low + a.high;
+    let (least, most) = (-0.25 * alpha * alpha, -a.low * a.high);
+    Band::around(alpha, least, most, a.magnitude(), 0.0)
+}
+
+/// The band of √a over positive numbers, whose slope is the chord's at a quarter of the inverse slope.
+#[inline]
+fn sqrt_band(a: Interval) -> Option<Band> {
+    let (p, q) = (a.low.sqrt(), a.high.sqrt());
+    let alpha = 1.0 / (p + q);
+    Band::around(alpha, p * q * alpha, 0.25 * (p + q), a.high, 0.0)
+}
+
+/// The band of [`Function::Quintic`] over any finite numbers.
+#[inline(always)]
+pub(crate) fn quintic_band(a: Interval) -> Band {
+    let Interval { low, high } = a;
+    let value = |t: f64| {
+        let t = t.abs();
+        let u = if t < 1.0 { t } else { 1.0 } - 0.5;
+        let u2 = u * u;
+        0.5 - u * (1.875 + u2 * (6.0 * u2 - 5.0))
+    };
+    let width = high - low;
+    let reach = a.magnitude();
+    let alpha = if width > 64.0 * f64::EPSILON * reach {
+        (value(high) - value(low)) / width
+    } else {
+        0.0
+    };
+    // 30(t(1 − t))² = |α|, on the side where the sign is α's.
+    let s = (alpha.abs() * (1.0 / 30.0)).sqrt();
+    let root = larger(1.0 - 4.0 * s, 0.0).sqrt();
+    let side = if alpha > 0.0 { -0.5 } else { 0.5 };
+    // Places beyond an end say what the end does.
+    let places = [
+        low,
+        high,
+        0.0,
+        1.0,
+        -1.0,
+        side * (1.0 - root),
+        side * (1.0 + root),
+    ];
+    let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+    for t in places {
+        let t = larger(low, smaller(high, t));
+        let rest = value(t) - alpha * t;
+        least = smaller(rest, least);
+        most = larger(rest, most);
+    }
+    let size = larger(least.abs(), most.abs()) + 2.0 * alpha.abs() * reach;
+    Band {
+        alpha,
+        beta: 0.5 * (least + most),
+        delta: 0.5 * (most - least) + ROUNDING * size + QUINTIC_SLACK,
     }
 }
 

@@ -48,6 +48,7 @@ pub use slope::Slope;
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
+use crate::noise::lattice::Corner;
 use crate::noise::{Lattice, Noise};
 use crate::number::Number;
 use crate::shape::Shape;
@@ -95,6 +96,11 @@ pub(crate) trait Arithmetic: Number {
     /// Gradient noise at a place, thesis eq. (4.9).
     fn noise(lattice: Lattice, at: [Self; 3]) -> Self {
         noise::lattice::gradient_noise(lattice, at)
+    }
+
+    /// The exact sum of a lattice noise's kernels; `None` where a place is too far or too wide.
+    fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
+        noise::lattice::sum(corner, lattice, at)
     }
 
     /// A discrete surface at a place.

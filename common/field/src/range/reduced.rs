@@ -5,8 +5,11 @@
 //! the last *coefficient* is never negative (ERRATA row 1853).
 
 use crate::interval::{Interval, larger};
+use crate::noise::Lattice;
+use crate::noise::lattice::Corner;
 use crate::range::form::{Form, ROUNDING, TINY};
 use crate::range::function::Band;
+use crate::range::noise;
 
 /// x₀ + x₁e₁ + … + x_N e_N + error·e: each e in [−1, 1], the last shared with no other number.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -46,11 +49,13 @@ impl<const N: usize> Reduced<N> {
     }
 
     /// |x₁| + … + error.
+    #[inline]
     pub fn radius(&self) -> f64 {
         self.along.iter().fold(self.error, |sum, x| sum + x.abs())
     }
 
     /// All its values, thesis eq. (5.24), rounded outward.
+    #[inline]
     pub fn interval(&self) -> Interval {
         let radius = self.radius();
         if radius.is_finite() {
@@ -62,11 +67,13 @@ impl<const N: usize> Reduced<N> {
         }
     }
 
+    #[inline]
     fn magnitude(&self) -> f64 {
         self.centre.abs() + self.radius()
     }
 
     /// Itself, or nothing known where an overflow left no number.
+    #[inline]
     pub(crate) fn checked(self) -> Self {
         let sound = self.centre.is_finite() && self.radius().is_finite();
         if sound { self } else { Self::UNKNOWN }
@@ -74,10 +81,12 @@ impl<const N: usize> Reduced<N> {
 }
 
 impl<const N: usize> Form for Reduced<N> {
+    #[inline]
     fn exact(value: f64) -> Self {
         Self::point(value).checked()
     }
 
+    #[inline]
     fn somewhere(range: Interval) -> Self {
         let centre = 0.5 * (range.low + range.high);
         let error = larger(range.high - centre, centre - range.low);
@@ -89,20 +98,27 @@ impl<const N: usize> Form for Reduced<N> {
         .checked()
     }
 
+    #[inline]
     fn span(&self) -> Interval {
         self.interval()
     }
 
+    #[inline]
     fn banded(&self, Band { alpha, beta, delta }: Band) -> Self {
         let size = alpha.abs() * self.magnitude() + beta.abs();
+        let mut along = self.along;
+        for x in &mut along {
+            *x *= alpha;
+        }
         Self {
             centre: alpha * self.centre + beta,
-            along: self.along.map(|x| alpha * x),
+            along,
             error: alpha.abs() * self.error + delta + (size * ROUNDING + TINY),
         }
         .checked()
     }
 
+    #[inline]
     fn added(&self, other: &Self, sign: f64) -> Self {
         let mut along = self.along;
         for (x, y) in along.iter_mut().zip(&other.along) {
@@ -121,6 +137,7 @@ impl<const N: usize> Form for Reduced<N> {
         .checked()
     }
 
+    #[inline]
     fn multiplied(&self, other: &Self) -> Self {
         let (x, y) = (self, other);
         let mut along = [0.0; N];
@@ -140,6 +157,7 @@ impl<const N: usize> Form for Reduced<N> {
         .checked()
     }
 
+    #[inline]
     fn with_error(self, error: f64) -> Self {
         Self {
             error: (self.error + error) * (1.0 + ROUNDING),
@@ -148,7 +166,12 @@ impl<const N: usize> Form for Reduced<N> {
         .checked()
     }
 
+    #[inline]
     fn condensed(self, _: &[Self; 3]) -> Self {
         self
+    }
+
+    fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
+        noise::reduced::sum(corner, lattice, at)
     }
 }

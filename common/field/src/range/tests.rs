@@ -3,6 +3,7 @@
 mod cells;
 mod chains;
 mod functions;
+mod lattices;
 
 use super::function::Function;
 use super::profile::Profile;

@@ -12,7 +12,7 @@ use crate::range::Arithmetic;
 use crate::range::function::Function;
 
 /// Beyond so many kernels the noise's range says as much as their sum.
-const KERNELS_MAX: usize = 64;
+pub(super) const KERNELS_MAX: usize = 64;
 
 /// How far evaluation in f32 may be from the exact noise: its own rounding, and that of three offsets to 2⁻²⁵ at the steepest slope.
 pub(crate) const BLUR: f64 = noise::ROUNDING + noise::SLOPE * super::OFFSETS;
@@ -43,29 +43,35 @@ fn many<T: Arithmetic>(at: &T, span: Interval) -> Vec<Plane<T>> {
 }
 
 /// How many planes an interval touches.
+#[inline(always)]
 fn planes(span: Interval) -> f64 {
     smaller(span.high.ceil() - span.low.floor(), 1e9) + 1.0
 }
 
 /// Gradient noise at `at`.
 pub(crate) fn gradient_noise<T: Arithmetic>(lattice: Lattice, at: [T; 3]) -> T {
-    match sum(Corner::Gradient, lattice, &at) {
+    match T::kernels(Corner::Gradient, lattice, &at) {
         Some(sum) => sum.computed(BLUR).within(RANGE),
         None => T::any(RANGE),
     }
 }
 
+/// Whether coordinates are neither too far nor too wide.
+#[inline(always)]
+pub(super) fn near([x, y, z]: &[Interval; 3]) -> bool {
+    let near = |span: &Interval| span.low <= span.high && span.magnitude() < FAR;
+    let kernels = planes(*x) * planes(*y) * planes(*z);
+    near(x) && near(y) && near(z) && kernels <= KERNELS_MAX as f64
+}
+
 /// The exact noise; `None` where it is too far or too wide.
-pub(super) fn sum<T: Arithmetic>(corner: Corner, lattice: Lattice, at: &[T; 3]) -> Option<T> {
+pub(crate) fn sum<T: Arithmetic>(corner: Corner, lattice: Lattice, at: &[T; 3]) -> Option<T> {
     let spans = at.each_ref().map(T::range);
-    let near = spans
-        .iter()
-        .all(|span| span.low <= span.high && span.magnitude() < FAR);
-    let kernels: f64 = spans.iter().map(|span| planes(*span)).product();
-    if !near || kernels > KERNELS_MAX as f64 {
+    if !near(&spans) {
         return None;
     }
-    if kernels == 8.0 {
+    let within = |k: usize| planes(spans[k]) == 2.0;
+    if within(0) && within(1) && within(2) {
         // Within one cell, as almost always along a short part of a ray.
         let [x, y, z] = [0, 1, 2].map(|axis| {
             let first = spans[axis].low.floor();

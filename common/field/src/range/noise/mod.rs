@@ -8,6 +8,7 @@
 
 mod cellular;
 pub(crate) mod lattice;
+pub(crate) mod reduced;
 mod scattered;
 mod simplex;
 mod wavelet;
@@ -29,7 +30,7 @@ const REACHED: f64 = 1e-6;
 pub(crate) fn any<T: Arithmetic>(noise: &Noise, at: [T; 3]) -> T {
     let range = noise.range();
     let sum = match noise {
-        Noise::Lattice(corner, own) => lattice::sum(*corner, *own, &at),
+        Noise::Lattice(corner, own) => T::kernels(*corner, *own, &at),
         Noise::Simplex(own) => simplex::sum(*own, &at),
         Noise::Sparse(sparse) => return scattered::sparse(sparse, &at, range),
         Noise::Spot(spot) => return scattered::spot(spot, &at, range),
