@@ -21,7 +21,7 @@ use crate::output::{Report, columns};
 /// The least share of what processes do that threads should do.
 pub(crate) const BUDGET: f64 = 0.98;
 
-/// Renders of one thread shorter than this are measured and not judged, in seconds.
+/// Renders shorter than this, by one thread beside others, are measured and not judged, in seconds.
 pub(crate) const LEAST_SECONDS: f64 = 1.0;
 
 /// Clock ticks of the system in a second, in which it counts the time of processes.
@@ -39,14 +39,16 @@ pub(crate) const SCENES: [(&str, Ours); 5] = [
 /// Most N of the N × N rays by which a scene is made longer.
 const RAYS_MAX: f64 = 16.0;
 
-/// The N of the N × N rays with which a scene takes well over a second, if it takes so long with one.
+/// The N of the N × N rays with which so many threads take well over a second, if one takes so long with one ray.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "a whole number of at most 16"
 )]
-pub(crate) fn rays(seconds: f64) -> u32 {
-    let wanted = (1.5 * LEAST_SECONDS / seconds).sqrt().ceil();
+pub(crate) fn rays(seconds: f64, threads: u32) -> u32 {
+    let wanted = (1.5 * LEAST_SECONDS * f64::from(threads) / seconds)
+        .sqrt()
+        .ceil();
     wanted.clamp(1.0, RAYS_MAX) as u32
 }
 
@@ -251,7 +253,9 @@ mod tests {
 
     #[test]
     fn short_scenes_get_more_rays() {
-        assert_eq!([6.0, 1.5, 0.4, 0.06, 1e-9].map(rays), [1, 1, 2, 5, 16]);
+        let alone = [6.0, 1.5, 0.4, 0.06, 1e-9].map(|seconds| rays(seconds, 1));
+        assert_eq!(alone, [1, 1, 2, 5, 16]);
+        assert_eq!(rays(1.5, 4), 2);
     }
 
     #[test]

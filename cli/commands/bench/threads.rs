@@ -115,7 +115,7 @@ fn chosen(options: &Options, folder: &Path) -> Result<Vec<Chosen>, Error> {
                     settings.extend(["--set".to_owned(), (*set).to_owned()]);
                 }
                 let once = render(&file, &settings, &place, (1, 1))?;
-                let rays = rays(once.seconds);
+                let rays = rays(once.seconds, options.threads);
                 if rays > 1 {
                     settings[1] = rays.to_string();
                     settings.extend(["--set", "sampling.filter_order=4"].map(str::to_owned));
