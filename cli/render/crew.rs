@@ -1,8 +1,5 @@
 //! Threads for a moment in which the others have nothing to do.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::thread;
-
 use render::Crew;
 
 /// So many threads, the calling one included; fewer where the system gives no more.
@@ -11,30 +8,14 @@ pub(super) struct Threads(pub(super) usize);
 
 impl Crew for Threads {
     fn each(&self, count: usize, piece: &(dyn Fn(usize) + Sync)) {
-        let next = AtomicUsize::new(0);
-        let work = || {
-            loop {
-                match next.fetch_add(1, Ordering::Relaxed) {
-                    index if index < count => piece(index),
-                    _ => return,
-                }
-            }
-        };
-        thread::scope(|scope| {
-            for _ in 1..self.0.min(count) {
-                let spawned = thread::Builder::new().spawn_scoped(scope, work);
-                if spawned.is_err() {
-                    break;
-                }
-            }
-            work();
-        });
+        image::in_order((0..count).collect(), self.0, piece);
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn every_piece_is_done_once() {

@@ -9,7 +9,7 @@ pub(crate) mod metadata;
 mod png;
 mod ppm;
 pub(crate) mod publish;
-mod share;
+pub(crate) mod share;
 mod zip;
 
 use std::path::PathBuf;

@@ -6,7 +6,7 @@ use std::thread;
 /// What `of` makes of every item, in the items' order, on this thread and `threads` − 1 others.
 ///
 /// Where the system gives no further thread, those that there are do it all.
-pub(super) fn in_order<T: Send, R: Send>(
+pub fn in_order<T: Send, R: Send>(
     items: Vec<T>,
     threads: usize,
     of: impl Fn(T) -> R + Sync,
@@ -14,6 +14,7 @@ pub(super) fn in_order<T: Send, R: Send>(
     if threads <= 1 || items.len() <= 1 {
         return items.into_iter().map(of).collect();
     }
+    let count = items.len();
     let mut results: Vec<Option<R>> = items.iter().map(|_| None).collect();
     let waiting = Mutex::new(items.into_iter().zip(&mut results));
     let work = || {
@@ -27,7 +28,7 @@ pub(super) fn in_order<T: Send, R: Send>(
         }
     };
     thread::scope(|scope| {
-        for _ in 1..threads {
+        for _ in 1..threads.min(count) {
             if thread::Builder::new().spawn_scoped(scope, work).is_err() {
                 break;
             }
