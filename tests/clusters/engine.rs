@@ -99,7 +99,12 @@ impl Engine {
             );
             return false;
         }
-        assert!(output.status.success(), "{kind}-up.sh: {output:?}");
+        assert!(
+            output.status.success(),
+            "{kind}-up.sh ended with {}:\n{}",
+            output.status,
+            String::from_utf8_lossy(&output.stderr)
+        );
         true
     }
 
