@@ -9,7 +9,7 @@
 //!   how it is packed.
 //!
 //! It never learns what a scene, a tile or an attempt is. All input and output blocks; memory is
-//! bounded by a strip of 32 rows while writing and by [`DECODED_BYTES_MAX`] while reading.
+//! bounded by a few strips of 32 rows while writing, 64 MiB of them or one, and by [`DECODED_BYTES_MAX`] while reading.
 //! The tests in `tests/whole_way` show it whole.
 
 mod compare;
@@ -19,6 +19,7 @@ mod frame;
 mod info;
 mod read;
 mod scratch;
+mod share;
 mod view;
 
 pub use compare::{Comparison, Difference, compare};
@@ -26,9 +27,9 @@ pub use digest::file_digest;
 pub use error::ImageError;
 pub use frame::formats::{BadFormats, Format, Formats, frame_name};
 pub use frame::metadata::{FrameMetadata, METADATA_TEXT_MAX};
-pub use frame::share::in_order;
 pub use frame::{FinishedFile, FinishedFrame, FrameRequest, finish};
 pub use info::{ChannelInfo, FrameInfo, PartInfo, info};
 pub use read::{DECODED_BYTES_MAX, FileKind, SampleKind, Window};
 pub use scratch::{Opened, Scratch, ScratchIdentity};
+pub use share::in_order;
 pub use view::ViewTransform;

@@ -27,8 +27,7 @@ use model::{Digest, Rect};
 
 use super::Source;
 use super::publish::Pending;
-use super::share::in_order;
-use super::zip;
+use super::zip::Zip;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
@@ -43,10 +42,6 @@ const _: () = assert!(
 
 /// Side of a tile: that of a grid square and the height of a strip.
 const TILE: usize = GRID_SQUARE as usize;
-
-/// Tiles that are compressed between two writes, for each thread: what an image's encoding holds in memory
-/// is bounded by them.
-const TILES_A_THREAD: usize = 64;
 
 /// Where the attributes begin: behind the magic number and the version.
 const HEADER_FROM: u64 = 8;
@@ -75,22 +70,22 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
         [header(source, &channels)].into_iter().collect(),
         true,
         |_, chunks| {
-            let threads = source.request.threads.max(1);
-            let mut waiting = Vec::new();
-            let mut write = |waiting: &mut Vec<Tile>| {
-                write_tiles(std::mem::take(waiting), threads, chunks)
-                    .map_err(|error| refused(pending, error))
+            let of = |strip: &Strip| {
+                let lines = Lines::of(strip, window, &channels);
+                let tiles = compress(&lines).map_err(|error| refused(pending, error))?;
+                Ok((lines.bytes, tiles))
             };
-            let result = source.scratch.for_each_strip(|strip| {
-                let lines = encode(strip, &channels);
-                lines.iter().for_each(|line| hasher.samples(line));
-                cut(window, strip.rows().start, &lines, &mut waiting);
-                if waiting.len() >= TILES_A_THREAD * threads {
-                    write(&mut waiting)?;
+            let each = |(lines, tiles): (Vec<u8>, Vec<(usize, Chunk)>)| {
+                hasher.samples(&lines);
+                for (number, chunk) in tiles {
+                    let written = chunks.write_chunk(number, chunk);
+                    written.map_err(|error| refused(pending, error))?;
                 }
                 Ok(())
-            });
-            result.and_then(|()| write(&mut waiting)).map_err(|error| {
+            };
+            let threads = source.request.threads;
+            let result = source.scratch.for_each_strip(threads, of, each);
+            result.map_err(|error| {
                 ours = Some(error);
                 ExrError::Aborted
             })
@@ -128,45 +123,65 @@ fn sort_attributes(mut file: &File) -> io::Result<()> {
     file.write_all(&attributes.concat())
 }
 
-/// A tile before it is compressed: its place among the tiles, its number in the file, and its samples.
-struct Tile {
-    place: Vec2<usize>,
-    number: usize,
-    samples: Vec<u8>,
+/// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
+struct Lines {
+    /// Number of its row of tiles.
+    row: usize,
+    /// Pixels of a line.
+    width: usize,
+    /// Bytes of a sample, for each line of a row.
+    sizes: [usize; CHANNEL_COUNT],
+    bytes: Vec<u8>,
 }
 
-/// Appends the tiles of one strip.
-fn cut(window: Rect, y: u32, lines: &[Vec<u8>], tiles: &mut Vec<Tile>) {
-    let width = window.width() as usize;
-    let columns = width.div_ceil(TILE);
-    let row = (y - window.y0) as usize / TILE;
-    for column in 0..columns {
-        let x = column * TILE;
-        let end = width.min(x + TILE);
-        let mut samples = Vec::new();
-        for line in lines {
-            let bytes = line.len() / width;
-            samples.extend_from_slice(&line[x * bytes..end * bytes]);
+impl Lines {
+    fn of(strip: &Strip, window: Rect, channels: &[usize; CHANNEL_COUNT]) -> Self {
+        let mut bytes = Vec::new();
+        for y in strip.rows() {
+            for &channel in channels {
+                let samples = strip.row(channel, y);
+                match CHANNELS[channel].storage {
+                    Storage::Half => append_half_bytes(samples, &mut bytes),
+                    Storage::Float => append_le_bytes(samples, &mut bytes),
+                }
+            }
         }
-        tiles.push(Tile {
-            place: Vec2(column, row),
-            number: row * columns + column,
-            samples,
-        });
+        Self {
+            row: (strip.rows().start - window.y0) as usize / TILE,
+            width: window.width() as usize,
+            sizes: channels.map(|channel| match CHANNELS[channel].storage {
+                Storage::Half => size_of::<f16>(),
+                Storage::Float => size_of::<f32>(),
+            }),
+            bytes,
+        }
+    }
+
+    /// The samples of a tile: for each row, for each channel.
+    fn tile(&self, column: usize) -> Vec<u8> {
+        let x = column * TILE;
+        let end = self.width.min(x + TILE);
+        let mut samples = Vec::new();
+        let (mut line, mut sizes) = (0, self.sizes.iter().cycle());
+        while line < self.bytes.len()
+            && let Some(size) = sizes.next()
+        {
+            samples.extend_from_slice(&self.bytes[line + x * size..line + end * size]);
+            line += self.width * size;
+        }
+        samples
     }
 }
 
-/// Compresses tiles and writes them in their order.
-fn write_tiles(
-    tiles: Vec<Tile>,
-    threads: usize,
-    chunks: &mut impl ChunksWriter,
-) -> Result<(), ExrError> {
-    let compressed = in_order(tiles, threads, |tile| {
-        let compressed_pixels_le = zip::compress(tile.samples)?;
+/// The tiles of a strip with their numbers in the file.
+fn compress(lines: &Lines) -> Result<Vec<(usize, Chunk)>, ExrError> {
+    let mut zip = Zip::new();
+    let columns = lines.width.div_ceil(TILE);
+    let tile = |column| {
+        let compressed_pixels_le = zip.compress(lines.tile(column)).map_err(io::Error::from)?;
         let block = CompressedTileBlock {
             coordinates: TileCoordinates {
-                tile_index: tile.place,
+                tile_index: Vec2(column, lines.row),
                 level_index: Vec2(0, 0),
             },
             compressed_pixels_le,
@@ -175,29 +190,9 @@ fn write_tiles(
             layer_index: 0,
             compressed_block: CompressedBlock::Tile(block),
         };
-        Ok::<_, ExrError>((tile.number, chunk))
-    });
-    for tile in compressed {
-        let (number, chunk) = tile?;
-        chunks.write_chunk(number, chunk)?;
-    }
-    Ok(())
-}
-
-/// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
-fn encode(strip: &Strip, channels: &[usize; CHANNEL_COUNT]) -> Vec<Vec<u8>> {
-    let line = |y: u32, channel: usize| {
-        let (row, mut bytes) = (strip.row(channel, y), Vec::new());
-        match CHANNELS[channel].storage {
-            Storage::Half => append_half_bytes(row, &mut bytes),
-            Storage::Float => append_le_bytes(row, &mut bytes),
-        }
-        bytes
+        Ok((lines.row * columns + column, chunk))
     };
-    strip
-        .rows()
-        .flat_map(|y| channels.iter().map(move |channel| line(y, *channel)))
-        .collect()
+    (0..columns).map(tile).collect()
 }
 
 /// Appends the nearest halves, little-endian; the largest finite one for what lies beyond.

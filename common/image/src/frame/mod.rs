@@ -9,7 +9,6 @@ pub(crate) mod metadata;
 mod png;
 mod ppm;
 pub(crate) mod publish;
-pub(crate) mod share;
 mod zip;
 
 use std::path::PathBuf;
@@ -19,9 +18,9 @@ use model::{Digest, ImageNumber};
 use self::formats::{Format, Formats, frame_name};
 use self::metadata::FrameMetadata;
 use self::publish::{Pending, sync_folder_of};
-use self::share::in_order;
 use crate::error::ImageError;
 use crate::scratch::Scratch;
+use crate::share::in_order;
 use crate::view::ViewTransform;
 
 /// What to make of a finished scratch file.
@@ -82,7 +81,7 @@ pub fn finish(scratch: &Scratch, request: &FrameRequest) -> Result<FinishedFrame
     let source = Source {
         scratch,
         request,
-        film_digest: scratch.film_digest()?,
+        film_digest: scratch.film_digest_by(request.threads)?,
     };
     let formats: Vec<Format> = request.formats.iter().collect();
     let written = in_order(formats, request.threads, |format| write(&source, format));

@@ -29,20 +29,43 @@ impl Depth {
         }
     }
 
-    /// One row of a strip as R, G, B per pixel; 16 bits big-endian.
-    pub(super) fn encode(self, strip: &Strip, y: u32, display: &Display, row: &mut Vec<u8>) {
-        let [red, green, blue] = [0, 1, 2].map(|channel| strip.row(channel, y));
-        row.clear();
-        for ((red, green), blue) in red.iter().zip(green).zip(blue) {
-            for code in display.codes([*red, *green, *blue]) {
-                let bytes = code.to_be_bytes();
+    /// The rows of a strip.
+    pub(super) fn encode(self, strip: &Strip, display: &Display) -> Rows {
+        let mut rows = Rows::default();
+        for y in strip.rows() {
+            let [red, green, blue] = [0, 1, 2].map(|channel| strip.row(channel, y));
+            let row = rows.interleaved.len();
+            for ((red, green), blue) in red.iter().zip(green).zip(blue) {
+                for code in display.codes([*red, *green, *blue]) {
+                    let bytes = code.to_be_bytes();
+                    match self {
+                        Self::Eight => rows.interleaved.push(bytes[1]),
+                        Self::Sixteen => rows.interleaved.extend(bytes),
+                    }
+                }
+            }
+            let row = &rows.interleaved[row..];
+            for channel in [2, 1, 0] {
                 match self {
-                    Self::Eight => row.push(bytes[1]),
-                    Self::Sixteen => row.extend(bytes),
+                    Self::Eight => rows.hashed.extend(row.iter().skip(channel).step_by(3)),
+                    Self::Sixteen => rows.hashed.extend(
+                        row.chunks_exact(6)
+                            .flat_map(|pixel| [pixel[2 * channel + 1], pixel[2 * channel]]),
+                    ),
                 }
             }
         }
+        rows
     }
+}
+
+/// Some rows of a PNG or PPM.
+#[derive(Default)]
+pub(super) struct Rows {
+    /// R, G, B per pixel; 16 bits big-endian.
+    pub(super) interleaved: Vec<u8>,
+    /// The same as the digest of stored values takes it: for each row all of B, G and R, little-endian.
+    pub(super) hashed: Vec<u8>,
 }
 
 /// Writes the frame and returns the digest of what it stores.
@@ -64,17 +87,14 @@ pub(super) fn write(
     );
     let mut writer = encoder.and_then(Encoder::write_header).map_err(failed)?;
     let mut stream = writer.stream_writer().map_err(failed)?;
-    let mut row = Vec::new();
-    source.scratch.for_each_strip(|strip| {
-        for y in strip.rows() {
-            depth.encode(strip, y, &display, &mut row);
-            hash_row(&mut hasher, &row, depth);
-            stream
-                .write_all(&row)
-                .map_err(|error| ImageError::io("write", pending.target(), error))?;
-        }
-        Ok(())
-    })?;
+    let of = |strip: &Strip| Ok(depth.encode(strip, &display));
+    let each = |rows: Rows| {
+        hasher.samples(&rows.hashed);
+        stream
+            .write_all(&rows.interleaved)
+            .map_err(|error| ImageError::io("write", pending.target(), error))
+    };
+    (source.scratch).for_each_strip(source.request.threads, of, each)?;
     stream.finish().map_err(failed)?;
     writer.finish().map_err(failed)?;
     Ok(hasher.finish())
@@ -131,18 +151,4 @@ pub(super) fn hash_head(hasher: &mut StoredHasher, window: Rect, depth: Depth) {
     // Sorted by name, like every part's channels.
     let channels = ["B", "G", "R"].map(|name| (name, kind));
     hasher.part("", size, size, channels.into_iter());
-}
-
-/// Takes a row of interleaved R, G, B into the digest of stored values.
-pub(super) fn hash_row(hasher: &mut StoredHasher, row: &[u8], depth: Depth) {
-    for channel in [2, 1, 0] {
-        let samples: Vec<u8> = match depth {
-            Depth::Eight => row.iter().skip(channel).step_by(3).copied().collect(),
-            Depth::Sixteen => row
-                .chunks_exact(6)
-                .flat_map(|pixel| [pixel[2 * channel + 1], pixel[2 * channel]])
-                .collect(),
-        };
-        hasher.samples(&samples);
-    }
 }

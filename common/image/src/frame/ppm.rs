@@ -8,8 +8,9 @@ use super::Source;
 use super::publish::Pending;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
-use crate::frame::png::{Depth, hash_head, hash_row};
+use crate::frame::png::{Depth, Rows, hash_head};
 use crate::read::FileKind;
+use crate::scratch::Strip;
 
 /// Writes the frame and returns the digest of what it stores.
 pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, ImageError> {
@@ -20,15 +21,12 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
     hash_head(&mut hasher, window, Depth::Eight);
     let mut out = BufWriter::with_capacity(1 << 16, pending.file());
     write!(out, "P6\n{} {}\n255\n", window.width(), window.height()).map_err(failed)?;
-    let mut row = Vec::new();
-    source.scratch.for_each_strip(|strip| {
-        for y in strip.rows() {
-            Depth::Eight.encode(strip, y, &display, &mut row);
-            hash_row(&mut hasher, &row, Depth::Eight);
-            out.write_all(&row).map_err(failed)?;
-        }
-        Ok(())
-    })?;
+    let of = |strip: &Strip| Ok(Depth::Eight.encode(strip, &display));
+    let each = |rows: Rows| {
+        hasher.samples(&rows.hashed);
+        out.write_all(&rows.interleaved).map_err(failed)
+    };
+    (source.scratch).for_each_strip(source.request.threads, of, each)?;
     out.flush().map_err(failed)?;
     Ok(hasher.finish())
 }

@@ -4,7 +4,7 @@ use model::film::{CHANNEL_COUNT, CHANNELS};
 use model::{Digest, Rect};
 
 use super::Scratch;
-use super::strip::append_le_bytes;
+use super::strip::{Strip, append_le_bytes};
 use crate::error::ImageError;
 
 /// Rises when what the digest is taken over changes.
@@ -19,6 +19,11 @@ impl Scratch {
     /// It does not depend on tiling, order or interruptions. Fails if pixels are missing or the
     /// file cannot be read. Holds a strip of 32 rows in memory.
     pub fn film_digest(&self) -> Result<Digest, ImageError> {
+        self.film_digest_by(1)
+    }
+
+    /// The same, read by so many threads.
+    pub(crate) fn film_digest_by(&self, threads: usize) -> Result<Digest, ImageError> {
         let mut hasher = blake3::Hasher::new_derive_key("flyby film v1");
         let mut number = |value: u32| {
             hasher.update(&value.to_le_bytes());
@@ -32,15 +37,18 @@ impl Scratch {
             hasher.update(&length.to_le_bytes());
             hasher.update(channel.name.as_bytes());
         }
-        let mut bytes = Vec::new();
-        self.for_each_strip(|strip| {
+        // By the strip: of short pieces the hash takes several times as long.
+        let bytes = |strip: &Strip| {
+            let mut bytes = Vec::new();
             for y in strip.rows() {
-                bytes.clear();
                 for channel in 0..CHANNEL_COUNT {
                     append_le_bytes(strip.row(channel, y), &mut bytes);
                 }
-                hasher.update(&bytes);
             }
+            Ok(bytes)
+        };
+        self.for_each_strip(threads, bytes, |bytes| {
+            hasher.update(&bytes);
             Ok(())
         })?;
         Ok(Digest(*hasher.finalize().as_bytes()))

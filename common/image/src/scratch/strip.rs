@@ -10,9 +10,14 @@ use model::rect::GRID_SQUARE;
 use super::Scratch;
 use super::grid::SLOT_BYTES;
 use crate::error::ImageError;
+use crate::share::in_sequence;
 
 /// Rows of a strip; the last one of a window may have fewer.
 pub(crate) const STRIP_ROWS: u32 = GRID_SQUARE;
+
+/// Most bytes of strips that are read ahead at a time, or one strip's: what an image's encoding holds in memory is about
+/// twice that for each format.
+const AHEAD_BYTES: usize = 64 << 20;
 
 /// Some rows of a window, every channel; −0 has become +0.
 #[derive(Debug)]
@@ -42,36 +47,44 @@ impl Strip {
 }
 
 impl Scratch {
-    /// Hands the window to `each` strip by strip from its top, [`STRIP_ROWS`] rows at a time.
+    /// Hands what `of` makes of each strip of the window to `each`, from the top on this thread, while `threads` − 1 others
+    /// go on with the next strips.
     ///
-    /// Fails if pixels are missing, if the system refuses, or with what `each` fails with.
-    pub(crate) fn for_each_strip(
+    /// Fails if pixels are missing, if the system refuses, or with the first failure of `of` or `each`.
+    pub(crate) fn for_each_strip<R: Send>(
         &self,
-        mut each: impl FnMut(&Strip) -> Result<(), ImageError>,
+        threads: usize,
+        of: impl Fn(&Strip) -> Result<R, ImageError> + Sync,
+        mut each: impl FnMut(R) -> Result<(), ImageError>,
     ) -> Result<(), ImageError> {
         self.require_complete()?;
         let window = self.window();
-        let mut slot = vec![0; SLOT_BYTES];
-        let mut strip = Strip {
-            rect: window,
-            samples: Vec::new(),
-        };
-        for y0 in (window.y0..window.y1).step_by(STRIP_ROWS as usize) {
-            strip.rect = Rect {
+        let strips = (window.y0..window.y1)
+            .step_by(STRIP_ROWS as usize)
+            .map(|y0| Rect {
                 y0,
                 y1: window.y1.min(y0 + STRIP_ROWS),
                 ..window
-            };
-            strip.samples.resize(
-                CHANNEL_COUNT * strip.rect.width() as usize * strip.rect.height() as usize,
-                0.0,
-            );
-            for block in strip.rect.blocks() {
-                self.fill(&mut strip, block, &mut slot)?;
-            }
-            each(&strip)?;
+            });
+        let bytes = CHANNEL_COUNT * 4 * window.width() as usize * STRIP_ROWS as usize;
+        let ahead = (AHEAD_BYTES / bytes).clamp(1, 2 * threads.max(1));
+        let threads = threads.min(ahead);
+        let read = |rect| self.strip(rect).and_then(|strip| of(&strip));
+        in_sequence(strips, threads, ahead, read, |made| each(made?))
+    }
+
+    /// Reads some rows of the window.
+    fn strip(&self, rect: Rect) -> Result<Strip, ImageError> {
+        let pixels = rect.width() as usize * rect.height() as usize;
+        let mut strip = Strip {
+            rect,
+            samples: vec![0.0; CHANNEL_COUNT * pixels],
+        };
+        let mut slot = vec![0; SLOT_BYTES];
+        for block in rect.blocks() {
+            self.fill(&mut strip, block, &mut slot)?;
         }
-        Ok(())
+        Ok(strip)
     }
 
     /// Copies one block into its place in the strip.
