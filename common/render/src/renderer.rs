@@ -216,9 +216,8 @@ impl ImageRenderer {
             work.tracer.stopwatch.begin(Part::Sampling);
             work.clear();
             let places = (part.y0..part.y1).flat_map(|y| (part.x0..part.x1).map(move |x| (x, y)));
-            for (x, y) in places.clone() {
-                self.strata.of_pixel(x, y, &mut work.samples);
-            }
+            let level = self.surface.level;
+            self.strata.of_pixels(level, part, &mut work.samples);
             let corner = [part.x0, part.y0];
             if Technique::Curve.is_used(self.surface.without) {
                 arrange(&mut work.samples, corner, self.slices, &mut work.from);

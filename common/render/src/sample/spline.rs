@@ -11,6 +11,12 @@ const SPANS: usize = 256;
 /// Newton's method ends after a step that is shorter than this, in pixels: the next one would be about its square.
 const STEP_MIN: f64 = 1e-8;
 
+/// Steps that numbers side by side take together; few need more, and go on alone.
+const STEPS_TOGETHER: usize = 2;
+
+/// Most pieces of a B-spline up to its middle.
+const PIECES: usize = FILTER_ORDER_MAX as usize / 2;
+
 /// Most Newton steps: far tails of high orders gain only a factor of (m − 1)/m with each.
 const STEPS_MAX: usize = 4096;
 
@@ -18,26 +24,56 @@ const STEPS_MAX: usize = 4096;
 #[derive(Clone, Debug)]
 pub(crate) struct BSpline {
     order: usize,
-    /// N_m and n_m from each whole number on, up to the middle: polynomials of the place from there.
-    pieces: Vec<Piece>,
+    last_piece: i32,
+    /// N_m and n_m from each whole number on, up to the middle.
+    distribution: Polynomials,
+    density: Polynomials,
     /// The inverse at y = i / (2 · `SPANS`), from 0 to the middle.
     starts: Vec<f64>,
 }
 
-/// Polynomials of a number between 0 and 1, the constant first.
+/// Polynomials of a number between 0 and 1: for each power, the highest first, the coefficients of all of them.
 #[derive(Clone, Debug)]
-struct Piece {
-    distribution: Vec<f64>,
-    density: Vec<f64>,
+struct Polynomials(Vec<[f64; PIECES]>);
+
+impl Polynomials {
+    /// Of polynomials with the constant first.
+    fn new(polynomials: &[Vec<f64>]) -> Self {
+        let powers = polynomials.first().map_or(0, Vec::len);
+        let of = |power| {
+            let mut coefficients = [0.0; PIECES];
+            for (coefficient, polynomial) in coefficients.iter_mut().zip(polynomials) {
+                *coefficient = polynomial[power];
+            }
+            coefficients
+        };
+        Self((0..powers).rev().map(of).collect())
+    }
+
+    /// Of each lane its polynomial's value.
+    #[inline(always)]
+    fn at<const N: usize>(&self, which: &[usize; N], s: &[f64; N]) -> [f64; N] {
+        let mut value = [0.0; N];
+        for coefficients in &self.0 {
+            for i in 0..N {
+                // Below it anyway, which lets the loop become gathers.
+                value[i] = value[i] * s[i] + coefficients[which[i] % PIECES];
+            }
+        }
+        value
+    }
 }
 
 impl BSpline {
     /// The B-spline of an order from 1 to [`FILTER_ORDER_MAX`].
     pub(crate) fn new(order: u32) -> Self {
         let order = order.clamp(1, FILTER_ORDER_MAX) as usize;
+        let (distribution, density): (Vec<_>, Vec<_>) = pieces(order).into_iter().unzip();
         let mut spline = Self {
             order,
-            pieces: pieces(order),
+            last_piece: i32::try_from(distribution.len()).map_or(0, |pieces| pieces - 1),
+            distribution: Polynomials::new(&distribution),
+            density: Polynomials::new(&density),
             starts: Vec::new(),
         };
         let middle = spline.width() / 2.0;
@@ -45,7 +81,7 @@ impl BSpline {
         let mut starts = vec![middle; SPANS + 1];
         for i in (0..SPANS).rev() {
             let y = i as f64 / (2 * SPANS) as f64;
-            starts[i] = spline.solve(y, starts[i + 1]);
+            [starts[i]] = spline.solve(&[y], [starts[i + 1]]);
         }
         spline.starts = starts;
         spline
@@ -57,73 +93,119 @@ impl BSpline {
     }
 
     /// N_m(x) and n_m(x), thesis eqs. (6.15c), (6.15d) and (6.16); `x` lies in 0 … m/2.
-    #[inline]
-    fn distribution(&self, x: f64) -> (f64, f64) {
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "a place in a list, held to it"
-        )]
-        let number = (x as usize).min(self.pieces.len() - 1);
-        let piece = &self.pieces[number];
-        let s = x - number as f64;
-        let at = |polynomial: &[f64]| {
-            let mut coefficients = polynomial.iter().rev();
-            let first = coefficients.next().copied().unwrap_or_default();
-            coefficients.fold(first, |value, coefficient| value * s + coefficient)
-        };
-        (at(&piece.distribution), at(&piece.density))
+    #[inline(always)]
+    fn distribution<const N: usize>(&self, x: &[f64; N]) -> ([f64; N], [f64; N]) {
+        let (mut which, mut s) = ([0; N], [0.0; N]);
+        for i in 0..N {
+            #[expect(clippy::cast_possible_truncation, reason = "at most 32")]
+            let number = (x[i] as i32).clamp(0, self.last_piece);
+            #[expect(clippy::cast_sign_loss, reason = "at least 0")]
+            let place = number as usize;
+            which[i] = place;
+            s[i] = x[i] - f64::from(number);
+        }
+        (
+            self.distribution.at(&which, &s),
+            self.density.at(&which, &s),
+        )
     }
 
     /// The x with N_m(x) = y, y in 0 … ½, by Newton's method, thesis eq. (6.19) mended.
     ///
     /// There N_m is convex, so that the first step may pass the root, and every other one falls short of it.
-    fn solve(&self, y: f64, start: f64) -> f64 {
-        if y <= 0.0 {
-            return 0.0;
+    #[inline(always)]
+    fn solve<const N: usize>(&self, y: &[f64; N], start: [f64; N]) -> [f64; N] {
+        let (mut x, mut open) = (start, [0; N]);
+        for i in 0..N {
+            let has_root = y[i] > 0.0;
+            x[i] = if has_root { x[i] } else { 0.0 };
+            open[i] = u64::from(has_root);
         }
-        let mut x = start;
-        for _ in 0..STEPS_MAX {
-            let (value, slope) = self.distribution(x);
-            if slope <= 0.0 {
-                break;
-            }
-            let step = (value - y) / slope;
-            let next = x - step;
-            x = next.clamp(0.0, self.width() / 2.0);
-            if step.abs() < STEP_MIN {
-                break;
+        self.newton(STEPS_TOGETHER, y, &mut x, &mut open);
+        for i in 0..N {
+            if open[i] > 0 {
+                x[i] = self.finish(y[i], x[i]);
             }
         }
         x
     }
 
-    /// Where a sample lies, in pixels from the filter's centre, for a uniform `y` in [0, 1).
-    pub(crate) fn inverse(&self, y: f64) -> f64 {
+    /// The same for one number, from an earlier step.
+    fn finish(&self, y: f64, x: f64) -> f64 {
+        let mut x = [x];
+        self.newton(STEPS_MAX, &[y], &mut x, &mut [1]);
+        x[0]
+    }
+
+    /// So many steps, or fewer, of the lanes that are `open`; closes those that are done.
+    #[inline(always)]
+    fn newton<const N: usize>(
+        &self,
+        steps: usize,
+        y: &[f64; N],
+        x: &mut [f64; N],
+        open: &mut [u64; N],
+    ) {
         let half = self.width() / 2.0;
-        // The tails are solved on the left alone, where y keeps its precision.
-        let (tail, sign) = if y <= 0.5 { (y, 1.0) } else { (1.0 - y, -1.0) };
-        #[expect(
-            clippy::cast_possible_truncation,
-            clippy::cast_sign_loss,
-            reason = "between 0 and SPANS, from a tail between 0 and 1/2"
-        )]
-        let span = (tail * (2 * SPANS) as f64) as usize;
-        let span = span.min(SPANS - 1);
-        let part = tail * (2 * SPANS) as f64 - span as f64;
-        let (below, above) = (self.starts[span], self.starts[span + 1]);
-        // On the chord, close below the root; in the outermost span, where N_m is flat, from above.
-        let start = if span == 0 {
-            above
-        } else {
-            below + (above - below) * part
-        };
-        (self.solve(tail, start) - half) * sign
+        for _ in 0..steps {
+            let (value, slope) = self.distribution(x);
+            let mut left = 0;
+            for i in 0..N {
+                let step = (value[i] - y[i]) / slope[i];
+                let next = x[i] - step;
+                let next = if next < 0.0 { 0.0 } else { next };
+                let next = if next > half { half } else { next };
+                let moves = open[i] & u64::from(slope[i] > 0.0);
+                x[i] = if moves > 0 { next } else { x[i] };
+                open[i] = moves & u64::from(step.abs() >= STEP_MIN);
+                left |= open[i];
+            }
+            if left == 0 {
+                break;
+            }
+        }
+    }
+
+    /// Where samples lie, in pixels from the filter's centre, for uniform `y` in [0, 1).
+    #[inline(always)]
+    pub(crate) fn inverse<const N: usize>(&self, y: &[f64; N]) -> [f64; N] {
+        let half = self.width() / 2.0;
+        let (mut tail, mut sign, mut start) = ([0.0; N], [0.0; N], [0.0; N]);
+        for i in 0..N {
+            // The tails are solved on the left alone, where y keeps its precision.
+            let is_left = y[i] <= 0.5;
+            tail[i] = if is_left { y[i] } else { 1.0 - y[i] };
+            sign[i] = if is_left { 1.0 } else { -1.0 };
+        }
+        for i in 0..N {
+            let place = tail[i] * (2 * SPANS) as f64;
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "between 0 and SPANS, from a tail between 0 and 1/2"
+            )]
+            let span = (place as usize).min(SPANS - 1);
+            let part = place - span as f64;
+            let (below, above) = (self.starts[span], self.starts[span + 1]);
+            // On the chord, close below the root; in the outermost span, where N_m is flat, from above.
+            start[i] = if span == 0 {
+                above
+            } else {
+                below + (above - below) * part
+            };
+        }
+        let mut x = self.solve(&tail, start);
+        for i in 0..N {
+            x[i] = (x[i] - half) * sign[i];
+        }
+        x
     }
 }
 
 /// The pieces of the B-spline of order m up to its middle, by the recursion n_q(x) = (x n_{q−1}(x) + (q − x) n_{q−1}(x − 1)) / (q − 1).
-fn pieces(m: usize) -> Vec<Piece> {
+///
+/// N_m and n_m, the constant first.
+fn pieces(m: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
     let count = m.div_ceil(2);
     // densities[j] is n_q over j … j + 1.
     let mut densities = vec![vec![0.0; m]; count];
@@ -150,10 +232,7 @@ fn pieces(m: usize) -> Vec<Piece> {
         let mut distribution = vec![below];
         distribution.extend(parts.map(|(k, value)| value / (k + 1) as f64));
         below = distribution.iter().sum();
-        Piece {
-            distribution,
-            density,
-        }
+        (distribution, density)
     };
     densities.into_iter().map(integrated).collect()
 }
@@ -190,7 +269,7 @@ mod tests {
         for order in [1, 2, 3, 4, 5, 8, 15, 20, 64] {
             let spline = BSpline::new(order);
             for y in shares() {
-                let x = spline.inverse(y) + f64::from(order) / 2.0;
+                let x = spline.inverse(&[y])[0] + f64::from(order) / 2.0;
                 let (back, _) = triangle(order as usize, x);
                 assert!((back - y).abs() < 1e-12, "order {order}: {y} gave {back}");
             }
@@ -201,13 +280,13 @@ mod tests {
     fn box_and_tent_have_their_closed_forms() {
         let (square, tent) = (BSpline::new(1), BSpline::new(2));
         for y in shares() {
-            assert!((square.inverse(y) - (y - 0.5)).abs() < 1e-12);
+            assert!((square.inverse(&[y])[0] - (y - 0.5)).abs() < 1e-12);
             let closed = if y < 0.5 {
                 (2.0 * y).sqrt() - 1.0
             } else {
                 1.0 - (2.0 * (1.0 - y)).sqrt()
             };
-            assert!((tent.inverse(y) - closed).abs() < 1e-7, "{y}");
+            assert!((tent.inverse(&[y])[0] - closed).abs() < 1e-7, "{y}");
         }
     }
 
@@ -223,12 +302,12 @@ mod tests {
                 let t = 2.0 - s;
                 t * t * t / 6.0
             };
-            assert!((cubic.distribution(x).1 - density).abs() < 1e-14);
+            assert!((cubic.distribution(&[x]).1[0] - density).abs() < 1e-14);
         }
         // The first piece of its distribution is x⁴/24.
         let y: f64 = 1e-3;
         let x = (24.0 * y).sqrt().sqrt() - 2.0;
-        assert!((cubic.inverse(y) - x).abs() < 1e-12);
+        assert!((cubic.inverse(&[y])[0] - x).abs() < 1e-12);
     }
 
     #[test]
@@ -241,7 +320,7 @@ mod tests {
             let m = f64::from(order);
             let mut moments = [0.0; 3];
             for i in 0..COUNT {
-                let x = spline.inverse((f64::from(i) + 0.5) / f64::from(COUNT));
+                let [x] = spline.inverse(&[(f64::from(i) + 0.5) / f64::from(COUNT)]);
                 assert!(x.abs() <= m / 2.0);
                 moments[0] += x / f64::from(COUNT);
                 moments[1] += x * x / f64::from(COUNT);
@@ -259,9 +338,9 @@ mod tests {
         let mut last = f64::NEG_INFINITY;
         for i in 1..4096 {
             let y = f64::from(i) / 4096.0;
-            let x = spline.inverse(y);
+            let [x] = spline.inverse(&[y]);
             assert!(x > last);
-            assert_eq!(x, -spline.inverse(1.0 - y));
+            assert_eq!(x, -spline.inverse(&[1.0 - y])[0]);
             last = x;
         }
     }
