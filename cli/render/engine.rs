@@ -327,8 +327,11 @@ impl Shared<'_> {
         };
         spent.blocks += times;
         let stored = timed(&mut spent.storing, || {
-            payload.clear();
-            payload.extend(pixels.iter().flat_map(|value| value.to_le_bytes()));
+            payload.resize(pixels.len() * 4, 0);
+            let (words, _) = payload.as_chunks_mut();
+            for (bytes, value) in words.iter_mut().zip(&*pixels) {
+                *bytes = value.to_le_bytes();
+            }
             work.scratch.write_block(block, payload)
         });
         stored.map_err(|error| {

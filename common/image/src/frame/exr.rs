@@ -205,8 +205,9 @@ fn append_half_bytes(samples: &[f32], out: &mut Vec<u8>) {
     halves.convert_from_f32_slice(&limited);
     let from = out.len();
     out.resize(from + halves.len() * 2, 0);
-    for (bytes, half) in out[from..].chunks_exact_mut(2).zip(halves) {
-        bytes.copy_from_slice(&half.to_le_bytes());
+    let (words, _) = out[from..].as_chunks_mut();
+    for (bytes, half) in words.iter_mut().zip(halves) {
+        *bytes = half.to_le_bytes();
     }
 }
 

@@ -102,9 +102,10 @@ impl Scratch {
                 let from = ((channel * side + (y % GRID_SQUARE) as usize) * side + in_slot) * 4;
                 let row = strip.place(channel, y);
                 let to = &mut strip.samples[row][in_strip..in_strip + width];
-                for (sample, bytes) in to.iter_mut().zip(slot[from..].chunks_exact(4)) {
-                    let value = f32::from_le_bytes(bytes.try_into().expect("four bytes"));
-                    *sample = if value == 0.0 { 0.0 } else { value };
+                let (words, _) = slot[from..].as_chunks();
+                for (sample, bytes) in to.iter_mut().zip(words) {
+                    // Of −0 this makes +0, and leaves every other number as it is.
+                    *sample = f32::from_le_bytes(*bytes) + 0.0;
                 }
             }
         }
@@ -116,7 +117,8 @@ impl Scratch {
 pub(crate) fn append_le_bytes(samples: &[f32], out: &mut Vec<u8>) {
     let from = out.len();
     out.resize(from + samples.len() * 4, 0);
-    for (bytes, sample) in out[from..].chunks_exact_mut(4).zip(samples) {
-        bytes.copy_from_slice(&sample.to_le_bytes());
+    let (words, _) = out[from..].as_chunks_mut();
+    for (bytes, sample) in words.iter_mut().zip(samples) {
+        *bytes = sample.to_le_bytes();
     }
 }
