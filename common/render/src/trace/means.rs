@@ -5,13 +5,14 @@
 //! ([`super::choice`]).
 
 use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::OnceLock;
 
 use field::{Interval, Segment};
 
 use super::surface::Surface;
 use super::tracer::{Goal, Ray, Tracer};
 use crate::counts::Counts;
-use crate::crew::{Crew, in_order};
+use crate::crew::Crew;
 use crate::sample::Sample;
 use crate::view::View;
 
@@ -118,6 +119,10 @@ const SQUARES: [u32; 2] = [6, 5];
 /// Pixels along the side of a square.
 const SIDE: u32 = 4;
 
+/// Rays that are tried together, half of them all: what a crew shares. Smaller pieces cost more, since few rays fill the lanes
+/// of a search badly.
+const PIECE: usize = (SQUARES[0] * SQUARES[1] * SIDE * SIDE / 2) as usize;
+
 /// Most evaluations along a ray that is tried: where all means need more, it matters little which is taken, and
 /// no field can make preparing an image take long.
 pub(crate) const STEPS_MAX: f64 = 1024.0;
@@ -167,7 +172,7 @@ impl<'a> Trial<'a> {
                 means: ranges,
                 ..surface.clone()
             };
-            let cost = cost(tried, &few, steps_max, best.1);
+            let cost = self.costs_along(&few, &[tried], steps_max, best.1)[0];
             if cost < best.1 {
                 return (ranges, cost);
             }
@@ -175,38 +180,81 @@ impl<'a> Trial<'a> {
         best
     }
 
-    /// What a ray costs on average with each of some surfaces. What costs more than `limit`, or than another one, may count as
-    /// infinitely dear: its trial ends where that is clear.
+    /// What a ray costs on average with each of some surfaces, in evaluations of a value. What costs more than `limit`, or than
+    /// another one, may count as infinitely dear: its trial ends where that is clear.
     pub(crate) fn costs(&self, surfaces: &[Surface], limit: f64) -> Vec<f64> {
+        self.costs_along(&self.rays, surfaces, STEPS_MAX, limit)
+    }
+
+    /// The same along other rays, with so many steps of each at most.
+    fn costs_along(
+        &self,
+        rays: &[Ray],
+        surfaces: &[Surface],
+        steps_max: f64,
+        limit: f64,
+    ) -> Vec<f64> {
+        let pieces: Vec<&[Ray]> = rays.chunks(PIECE).collect();
+        let costs: Vec<OnceLock<f64>> = (0..surfaces.len() * pieces.len())
+            .map(|_| OnceLock::new())
+            .collect();
+        // Once all of a surface's pieces are done; summed in their order, whichever ended first.
+        let total = |surface: usize| {
+            let costs = &costs[surface * pieces.len()..][..pieces.len()];
+            let total = costs.iter().map(|cost| cost.get().copied());
+            Some(total.sum::<Option<f64>>()? / rays.len() as f64)
+        };
         // The bits of numbers that are not negative are in the numbers' order.
         let least = AtomicU64::new(limit.to_bits());
-        in_order(self.crew, surfaces, |surface| {
-            let limit = f64::from_bits(least.load(Ordering::Relaxed));
-            let cost = cost(surface.clone(), &self.rays, STEPS_MAX, limit);
-            least.fetch_min(cost.to_bits(), Ordering::Relaxed);
-            cost
-        })
+        let evaluations: Vec<_> = surfaces.iter().map(|_| AtomicU64::new(0)).collect();
+        self.crew.each(costs.len(), &|index| {
+            let (surface, piece) = (index / pieces.len(), index % pieces.len());
+            let limit = f64::from_bits(least.load(Ordering::Relaxed)) * rays.len() as f64;
+            let rays = pieces[piece];
+            let cost = cost(
+                &surfaces[surface],
+                rays,
+                steps_max,
+                limit,
+                &evaluations[surface],
+            );
+            costs[index].get_or_init(|| cost);
+            if let Some(total) = total(surface) {
+                least.fetch_min(total.to_bits(), Ordering::Relaxed);
+            }
+        });
+        (0..surfaces.len())
+            .map(|surface| total(surface).unwrap_or(f64::INFINITY))
+            .collect()
     }
 }
 
-/// What a ray costs on average, in evaluations of a value; infinitely much if that is found to be more than `limit` before the end.
-fn cost(surface: Surface, rays: &[Ray], steps_max: f64, limit: f64) -> f64 {
-    let most = limit * rays.len() as f64;
+/// What rays cost, in evaluations of a value; infinitely much if the surface's `evaluations`, to which those of these rays are
+/// added, are found to be more than `limit` before the end.
+fn cost(
+    surface: &Surface,
+    rays: &[Ray],
+    steps_max: f64,
+    limit: f64,
+    evaluations: &AtomicU64,
+) -> f64 {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "the cast saturates"
     )]
+    let most = limit as u64;
     let surface = Surface {
         steps_max,
-        evaluations_max: most as u64,
-        ..surface
+        evaluations_max: most.saturating_sub(evaluations.load(Ordering::Relaxed)),
+        ..surface.clone()
     };
     let (mut counts, mut hits) = (Counts::default(), Vec::new());
     let never = AtomicBool::new(false);
     let goal = Goal::Distance;
     let mut tracer = Tracer::default();
     let done = tracer.trace(&surface, goal, rays, &never, &mut counts, &mut hits);
+    evaluations.fetch_add(counts.evaluations, Ordering::Relaxed);
     if done.is_err() {
         return f64::INFINITY;
     }
@@ -217,7 +265,7 @@ fn cost(surface: Surface, rays: &[Ray], steps_max: f64, limit: f64) -> f64 {
         let [together, alone] = tracer.coarse_evaluations();
         together * (1.0 - coarse.cost) + alone * (step_cost - coarse.cost)
     });
-    (values - spared) / rays.len() as f64
+    values - spared
 }
 
 /// Rays through squares of pixels all over the image, at its first instant.
