@@ -222,10 +222,7 @@ impl Camp {
             self.queue.delete(&arrays)?;
             thread::sleep(LOOK_EVERY);
         }
-        let folder = quote_path(&self.folder());
-        // The farm's folder goes with its last site.
-        let script =
-            format!("rm -rf {folder} && {{ rmdir \"$(dirname {folder})\" 2>/dev/null || :; }}");
+        let script = removal(&quote_path(&self.folder()));
         let said = self.way.run("removing what is left", &script, LIMIT)?;
         match said.code {
             Some(0) => {
@@ -237,14 +234,62 @@ impl Camp {
     }
 }
 
+/// The script that removes a site's folder, and the farm's with its last site.
+///
+/// What has just ended, or a last look at the site, may write a file into a folder whose others are removed already, and it is
+/// then not empty.
+fn removal(folder: &str) -> String {
+    format!(
+        "tries=50; until rm -rf {folder} 2>/dev/null; do tries=$((tries - 1)); [ $tries -gt 0 ] || break; sleep 0.1; done\n\
+         rm -rf {folder} && {{ rmdir \"$(dirname {folder})\" 2>/dev/null || :; }}"
+    )
+}
+
 fn folder(site: &Site, farm: &str) -> String {
     format!("{}/farm-{farm}/{}", site.folder, site.name)
 }
 
 #[cfg(test)]
 mod tests {
+    use std::process;
+
     use super::*;
     use crate::sites;
+
+    #[test]
+    fn a_folder_is_removed_although_something_still_writes_into_it() {
+        let place = tempfile::tempdir().unwrap();
+        let folder = place.path().join("farm/site");
+        fs::create_dir_all(&folder).unwrap();
+        // So many that removing them takes its time.
+        for number in 0..2000 {
+            fs::write(folder.join(format!("old{number}")), "").unwrap();
+        }
+        let path = folder.display();
+        // Ends once the folder is gone, as what is cleaned away does; else after so many files.
+        let writer = format!(
+            "echo begun; i=0; while [ $i -lt 2000 ]; do i=$((i + 1)); true 2>/dev/null >'{path}/'$i || exit 0; done"
+        );
+        let mut writer = process::Command::new("sh")
+            .args(["-c", &writer])
+            .stdout(process::Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut begun = [0];
+        writer
+            .stdout
+            .as_mut()
+            .unwrap()
+            .read_exact(&mut begun)
+            .unwrap();
+        let removed = process::Command::new("sh")
+            .args(["-c", &removal(&quote_path(&path.to_string()))])
+            .output()
+            .unwrap();
+        assert!(writer.wait().unwrap().success());
+        assert!(removed.status.success(), "{removed:?}");
+        assert!(!place.path().join("farm").exists());
+    }
 
     #[test]
     fn a_state_folder_keeps_its_farm_s_name() {
