@@ -16,6 +16,14 @@ pub(crate) struct Seen {
     pub(crate) surface: Option<(f64, DVec3)>,
 }
 
+impl Seen {
+    /// No light from nowhere.
+    pub(crate) const NOTHING: Self = Self {
+        radiance: [0.0; 3],
+        surface: None,
+    };
+}
+
 /// The pixels of a block, filled in any order.
 pub(crate) struct Film<'a> {
     pixels: &'a mut Vec<f32>,

@@ -401,13 +401,7 @@ impl ImageRenderer {
 
     /// Gives every sample its colour.
     fn shade(&self, work: &mut Work) {
-        work.seen.resize(
-            work.sights.len(),
-            Seen {
-                radiance: [0.0; 3],
-                surface: None,
-            },
-        );
+        work.seen.resize(work.sights.len(), Seen::NOTHING);
         self.shade_surface(work);
         work.tracer.stopwatch.begin(Part::Sky);
         self.shade_sky(work);
@@ -531,7 +525,8 @@ struct Work {
 impl Work {
     /// Puts what the samples saw into the order of their pixels.
     fn put_back(&mut self) {
-        self.in_order.clone_from(&self.seen);
+        // Every place is written, so that what was there does not matter.
+        self.in_order.resize(self.seen.len(), Seen::NOTHING);
         for (seen, &place) in self.seen.iter().zip(&self.from) {
             self.in_order[place as usize] = *seen;
         }
