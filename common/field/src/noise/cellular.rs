@@ -100,7 +100,7 @@ impl Norm {
 
     /// The same of numbers that are no f32.
     #[inline(always)]
-    fn measure_of(self, d: [f64; 3]) -> f64 {
+    pub(crate) fn measure_of(self, d: [f64; 3]) -> f64 {
         let [x, y, z] = d.map(f64::abs);
         match self {
             Self::One => x + y + z,
@@ -289,21 +289,16 @@ impl Cellular {
     /// The nodes of a cell, as places within it.
     pub(crate) fn nodes(&self, cell: [u32; 3]) -> impl Iterator<Item = [f64; 3]> + use<> {
         let state = cell_state(self.lattice, cell);
-        let (count, axes) = if !self.planar {
-            (self.count(state), 3)
-        } else if cell[2] == 0 {
-            (self.count(state), 2)
+        let count = if self.planar && cell[2] != 0 {
+            0
         } else {
-            (0, 2)
+            self.count(state)
         };
+        let planar = self.planar;
         (0..count).map(move |index| {
-            [0, 1, 2].map(|axis| {
-                if axis < axes {
-                    f64::from(fraction(draw(state, index, axis)))
-                } else {
-                    0.0
-                }
-            })
+            let along = |axis| f64::from(fraction(draw(state, index, axis)));
+            let up = if planar { 0.0 } else { along(2) };
+            [along(0), along(1), up]
         })
     }
 

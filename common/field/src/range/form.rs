@@ -4,12 +4,13 @@ use crate::arithmetic::Unary;
 use crate::curve::Curve;
 use crate::interval::{Interval, larger, smaller};
 use crate::noise::Lattice;
+use crate::noise::cellular::Cellular;
 use crate::noise::lattice::Corner;
 use crate::number::Number;
 use crate::range::Arithmetic;
 use crate::range::function::{Band, Function};
 use crate::range::interval::curve_over;
-use crate::range::noise;
+use crate::range::noise::{self, Near};
 
 /// Room for the rounding of one operation on forms, of the magnitudes that go into it.
 pub(crate) const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -39,6 +40,11 @@ pub(crate) trait Form: Clone {
     /// The exact sum of a lattice noise's kernels; `None` where a place is too far or too wide.
     fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
         noise::lattice::sum(corner, lattice, at)
+    }
+
+    /// A cellular noise's distances, or their squares, sorted into `sorted`, which begins with the greatest there can be.
+    fn nearest(cellular: &Cellular, near: &Near<Self>, sorted: &mut [Self]) {
+        noise::cellular::nearest(cellular, near, sorted);
     }
 }
 
@@ -279,5 +285,8 @@ impl<F: Form> Arithmetic for F {
 
     fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
         F::kernels(corner, lattice, at)
+    }
+    fn nearest(cellular: &Cellular, near: &Near<Self>, sorted: &mut [Self]) {
+        F::nearest(cellular, near, sorted);
     }
 }

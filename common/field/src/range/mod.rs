@@ -48,11 +48,13 @@ pub use slope::Slope;
 use crate::curve::Curve;
 use crate::grid::Surface;
 use crate::interval::Interval;
+use crate::noise::cellular::Cellular;
 use crate::noise::lattice::Corner;
 use crate::noise::{Lattice, Noise};
 use crate::number::Number;
 use crate::shape::Shape;
 use function::Function;
+use noise::Near;
 
 /// An arithmetic in which a whole field can be evaluated.
 pub(crate) trait Arithmetic: Number {
@@ -101,6 +103,11 @@ pub(crate) trait Arithmetic: Number {
     /// The exact sum of a lattice noise's kernels; `None` where a place is too far or too wide.
     fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
         noise::lattice::sum(corner, lattice, at)
+    }
+
+    /// A cellular noise's distances, or their squares, sorted into `sorted`, which begins with the greatest there can be.
+    fn nearest(cellular: &Cellular, near: &Near<Self>, sorted: &mut [Self]) {
+        noise::cellular::nearest(cellular, near, sorted);
     }
 
     /// A discrete surface at a place.

@@ -6,10 +6,11 @@
 
 use crate::interval::{Interval, larger};
 use crate::noise::Lattice;
+use crate::noise::cellular::Cellular;
 use crate::noise::lattice::Corner;
 use crate::range::form::{Form, ROUNDING, TINY};
 use crate::range::function::Band;
-use crate::range::noise;
+use crate::range::noise::{self, Near};
 
 /// x₀ + x₁e₁ + … + x_N e_N + error·e: each e in [−1, 1], the last shared with no other number.
 #[derive(Clone, Copy, PartialEq, Debug)]
@@ -173,5 +174,8 @@ impl<const N: usize> Form for Reduced<N> {
 
     fn kernels(corner: Corner, lattice: Lattice, at: &[Self; 3]) -> Option<Self> {
         noise::reduced::sum(corner, lattice, at)
+    }
+    fn nearest(cellular: &Cellular, near: &Near<Self>, sorted: &mut [Self]) {
+        noise::line::nearest(cellular, near, sorted);
     }
 }

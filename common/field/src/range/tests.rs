@@ -4,6 +4,7 @@ mod cells;
 mod chains;
 mod functions;
 mod lattices;
+mod lines;
 
 use super::function::Function;
 use super::profile::Profile;

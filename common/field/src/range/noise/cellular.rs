@@ -3,9 +3,10 @@
 //! The thesis has φ₁ and φ₂ alone, "due to the difficulty in determining the third and fourth smallest distances"
 //! (§5.4.3). Inserting each distance into a sorted list takes a minimum and a maximum per place, which every arithmetic
 //! has; of a set of uncertain distances the list then holds ranges of the smallest, the second smallest, and so on.
-//! Nodes that are certainly farther than enough others are never looked at.
+//! Nodes that are certainly farther than enough others are never looked at. Along a line there is a narrower way: `line`.
 
 use super::Near;
+use crate::interval::{Interval, larger};
 use crate::noise::cellular::{Cellular, Norm, ORDERS, Psi, REACH};
 use crate::range::Arithmetic;
 
@@ -21,25 +22,16 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
     let at = if cellular.is_planar() { &flat } else { at };
     let near = Near::new(at, 2, CELLS_MAX)?;
     let weights = cellular.weights();
-    let direct = cellular.psi() == Psi::Square && cellular.norm() == Norm::Two;
-    let cap = if direct { REACH * REACH } else { REACH };
-    let mut sorted = vec![T::constant(cap); weights.len()];
-    for node in candidates(cellular, &near) {
-        let ways = near.from(node);
-        let mut length = if direct {
-            super::squares(ways)
-        } else {
-            length(cellular.norm(), ways)
-        };
-        for slot in &mut sorted {
-            let (nearer, farther) = (slot.clone().min(length.clone()), slot.clone().max(length));
-            (*slot, length) = (nearer, farther);
-        }
-    }
+    let squared = is_squared(cellular);
+    let cap = if squared { REACH * REACH } else { REACH };
+    let mut room: [T; ORDERS] = std::array::from_fn(|_| T::constant(cap));
+    let sorted = &mut room[..weights.len()];
+    T::nearest(cellular, &near, sorted);
     let mut total = T::constant(-cellular.bias());
-    for (distance, weight) in sorted.into_iter().zip(weights) {
+    for (distance, weight) in sorted.iter().zip(weights) {
+        let distance = distance.clone();
         let psi = match cellular.psi() {
-            Psi::Square if !direct => distance.square(),
+            Psi::Square if !squared => distance.square(),
             Psi::Plain | Psi::Square => distance,
             Psi::Power(e) => distance.max(T::constant(0.0)).power(e),
         };
@@ -48,50 +40,180 @@ pub(super) fn sum<T: Arithmetic>(cellular: &Cellular, at: &[T; 3]) -> Option<T> 
     Some(total.settled(at))
 }
 
+/// Whether distances are kept as their squares, which are what counts and need no root.
+pub(super) fn is_squared(cellular: &Cellular) -> bool {
+    cellular.psi() == Psi::Square && cellular.norm() == Norm::Two
+}
+
+/// Sorts the distances of all nodes that may count into `sorted`, which begins with the greatest there can be.
+pub(crate) fn nearest<T: Arithmetic>(cellular: &Cellular, near: &Near<T>, sorted: &mut [T]) {
+    for (node, _) in Candidates::new(cellular, near).seen {
+        let ways = near.from(node);
+        let mut length = if is_squared(cellular) {
+            super::squares(ways)
+        } else {
+            length(cellular.norm(), ways)
+        };
+        for slot in &mut *sorted {
+            let (nearer, farther) = (slot.clone().min(length.clone()), slot.clone().max(length));
+            (*slot, length) = (nearer, farther);
+        }
+    }
+}
+
 /// The nodes that can be among those that count, anywhere in range.
-fn candidates<T: Arithmetic>(cellular: &Cellular, near: &Near<T>) -> Vec<[f64; 3]> {
-    let norm = cellular.norm();
-    let Some(last) = cellular.weights().len().checked_sub(1) else {
-        return Vec::new();
-    };
-    // However the place lies, as many nodes as there are orders are no farther than these.
-    let mut most = [REACH; ORDERS];
-    let mut seen: Vec<([f64; 3], f64)> = Vec::new();
-    for ring in 0..=2 {
-        for step in near.steps(ring) {
-            let outside = |k: usize| (near.first[k] - step[k]).max(step[k] - near.last[k]);
-            let farther = [0, 1, 2].map(outside).into_iter().max() < Some(ring);
-            if (ring > 0 && farther) || norm.length_of(near.gap(step)) > most[last] + ROOM {
-                continue;
+struct Candidates<'a, T> {
+    norm: Norm,
+    near: &'a Near<T>,
+    /// However the place lies, as many nodes as there are orders are no farther than these.
+    most: Vec<f64>,
+    /// Nodes, and how near they may be.
+    seen: Vec<([f64; 3], f64)>,
+}
+
+impl<'a, T: Arithmetic> Candidates<'a, T> {
+    fn new(cellular: &Cellular, near: &'a Near<T>) -> Self {
+        let mut found = Self {
+            norm: cellular.norm(),
+            near,
+            most: vec![REACH; cellular.weights().len()],
+            seen: Vec::new(),
+        };
+        if !found.most.is_empty() {
+            around(cellular, near, &mut found);
+        }
+        let farthest = found.farthest();
+        found.seen.retain(|(_, low)| *low <= farthest + ROOM);
+        found
+    }
+
+    fn farthest(&self) -> f64 {
+        self.most.last().copied().unwrap_or(0.0)
+    }
+}
+
+impl<T: Arithmetic> Search for Candidates<'_, T> {
+    fn add(&mut self, node: [f64; 3]) -> f64 {
+        let low = self.norm.length_of(self.near.least(node));
+        if low <= self.farthest() + ROOM {
+            self.seen.push((node, low));
+            let far = [0, 1, 2].map(|k| {
+                let span = self.near.spans[k];
+                larger(span.high - node[k], node[k] - span.low)
+            });
+            let high = self.norm.length_of(far);
+            let at = self.most.partition_point(|most| *most <= high);
+            if at < self.most.len() {
+                self.most[at..].rotate_right(1);
+                self.most[at] = high;
             }
-            for node in cellular.nodes(near.cell(step)) {
-                let node = [0, 1, 2].map(|k| node[k] + f64::from(step[k]));
-                let low = norm.length_of(near.least(node));
-                if low > most[last] + ROOM {
+        }
+        self.farthest()
+    }
+}
+
+/// What looks for the nodes that count.
+pub(super) trait Search {
+    /// Whether nodes of a cell can count, given its lower corner.
+    fn reaches(&self, _cell: [f64; 3]) -> bool {
+        true
+    }
+
+    /// Takes a node, and answers how far from the range the farthest that counts can be.
+    fn add(&mut self, node: [f64; 3]) -> f64;
+}
+
+/// Which axes have a cell on a side of its ring, those with fewer first, for they are nearer.
+const SIDES: [[bool; 3]; 7] = [
+    [true, false, false],
+    [false, true, false],
+    [false, false, true],
+    [true, true, false],
+    [true, false, true],
+    [false, true, true],
+    [true, true, true],
+];
+
+/// Shows a search the nodes around a range, those of nearer cells first.
+pub(super) fn around<T: Arithmetic>(cellular: &Cellular, near: &Near<T>, search: &mut impl Search) {
+    let norm = cellular.norm();
+    let measured = |distance: f64| norm.measure_of([distance + ROOM, 0.0, 0.0]);
+    let (mut most, mut bound) = (REACH, measured(REACH));
+    for ring in 0..=2 {
+        let within: &[[bool; 3]] = if ring == 0 { &[[false; 3]] } else { &SIDES };
+        for sides in within {
+            let along = |k: usize| Along::new(near, k, ring, sides[k]);
+            let (x, y, z) = (along(0), along(1), along(2));
+            for k in 0..z.count {
+                let (k, far) = z.step(k);
+                if norm.measure_of([0.0, 0.0, far]) > bound || (k != 0 && cellular.is_planar()) {
                     continue;
                 }
-                let far = [0, 1, 2].map(|k| {
-                    let span = near.spans[k];
-                    crate::interval::larger(span.high - node[k], node[k] - span.low)
-                });
-                let high = norm.length_of(far);
-                seen.push((node, low));
-                let mut at = ORDERS;
-                while at > 0 && high < most[at - 1] {
-                    at -= 1;
-                }
-                if at < ORDERS {
-                    most[at..].rotate_right(1);
-                    most[at] = high;
+                for j in 0..y.count {
+                    let (j, aside) = y.step(j);
+                    if norm.measure_of([0.0, aside, far]) > bound {
+                        continue;
+                    }
+                    for i in 0..x.count {
+                        let (i, ahead) = x.step(i);
+                        let corner = [f64::from(i), f64::from(j), f64::from(k)];
+                        if norm.measure_of([ahead, aside, far]) > bound || !search.reaches(corner) {
+                            continue;
+                        }
+                        for node in cellular.nodes(near.cell([i, j, k])) {
+                            let ([x, y, z], [a, b, c]) = (node, corner);
+                            let counts = search.add([x + a, y + b, z + c]);
+                            if counts != most {
+                                (most, bound) = (counts, measured(counts));
+                            }
+                        }
+                    }
                 }
             }
         }
-        if most[last] + ROOM < f64::from(ring) {
+        if most + ROOM < f64::from(ring) {
             break;
         }
     }
-    seen.retain(|(_, low)| *low <= most[last] + ROOM);
-    seen.into_iter().map(|(node, _)| node).collect()
+}
+
+/// The cells of a ring along an axis: both of its sides, the nearer first, or all between them.
+struct Along {
+    span: Interval,
+    first: i32,
+    stride: i32,
+    count: i32,
+}
+
+impl Along {
+    fn new<T>(near: &Near<T>, k: usize, ring: i32, sides: bool) -> Self {
+        let span = near.spans[k];
+        let (low, high) = (near.first[k] - ring, near.last[k] + ring);
+        let (first, stride, count) = if !sides && ring > 0 {
+            (low + 1, 1, high - low - 1)
+        } else if !sides {
+            (low, 1, high - low + 1)
+        } else if span.low - f64::from(low) < f64::from(high) + 1.0 - span.high {
+            (low, high - low, 2)
+        } else {
+            (high, low - high, 2)
+        };
+        Self {
+            span,
+            first,
+            stride,
+            count,
+        }
+    }
+
+    /// One of its cells, and how near the range may come to it along the axis.
+    #[inline(always)]
+    fn step(&self, i: i32) -> (i32, f64) {
+        let step = self.first + i * self.stride;
+        let low = f64::from(step);
+        let gap = larger(low - self.span.high, self.span.low - (low + 1.0));
+        (step, larger(gap, 0.0))
+    }
 }
 
 /// ‖d‖ as the norm has it, thesis eq. (4.20).

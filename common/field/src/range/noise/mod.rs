@@ -6,8 +6,9 @@
 //! Ranges hold the exact noise and the one that is computed in f32. Where kernels are few, so are rounding errors:
 //! scattered noises count those of the nodes in reach instead of the most that there can be.
 
-mod cellular;
+pub(crate) mod cellular;
 pub(crate) mod lattice;
+pub(crate) mod line;
 pub(crate) mod reduced;
 mod scattered;
 mod simplex;
@@ -46,7 +47,7 @@ pub(crate) fn any<T: Arithmetic>(noise: &Noise, at: [T; 3]) -> T {
 }
 
 /// A place or range as cells see it.
-struct Near<T> {
+pub(crate) struct Near<T> {
     /// The cell that everything is counted from.
     cell: [u32; 3],
     /// The way from its corner.
@@ -60,7 +61,7 @@ struct Near<T> {
 
 impl<T: Arithmetic> Near<T> {
     /// `None` if it is too far from the origin, or touches or neighbours (`reach` cells away) more than `cells_max` cells.
-    fn new(at: &[T; 3], reach: i32, cells_max: i32) -> Option<Self> {
+    pub(crate) fn new(at: &[T; 3], reach: i32, cells_max: i32) -> Option<Self> {
         let known = at.each_ref().map(T::range);
         let near = known
             .iter()
