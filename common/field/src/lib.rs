@@ -29,7 +29,7 @@ pub use interval::Interval;
 pub use modulus::{Level, Modulus};
 pub use op::{Basis, Kind, Op};
 pub use points::{BATCH, Points, Scratch};
-pub use program::{Boxes, CompileError, Cut, Outlook, Program, Sides, Taylor};
+pub use program::{Boxes, CompileError, Cut, Outlook, Program, Prospect, Sides, Taylor};
 pub use range::{Affine, Cell, Jet, Place, Reduced, Segment, Slope};
 pub use simd::SimdLevel;
 pub use surroundings::{Region, Surroundings};

@@ -1,6 +1,7 @@
 //! Where a program is evaluated, and the memory it is evaluated in.
 
 use crate::program::{Ahead, Machine, OverBoxes, Slopes};
+use crate::shape::Met;
 
 /// Points of one chunk of work: longer batches are cut into pieces of this length.
 pub const BATCH: usize = 128;
@@ -52,6 +53,7 @@ pub struct Scratch {
     pub(crate) along: Slopes<1>,
     pub(crate) stretches: Ahead,
     pub(crate) boxes: OverBoxes,
+    pub(crate) met: Met,
 }
 
 impl Scratch {

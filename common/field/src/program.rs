@@ -34,11 +34,12 @@ use bounds::Pass;
 pub use boxes::Boxes;
 pub(crate) use boxes::OverBoxes;
 pub use coarse::Cut;
-use code::{Code, Operation};
+use code::{Code, Instruction, Operation};
 use machine::Count;
 pub(crate) use machine::Machine;
 use plan::Plan;
 pub(crate) use slopes::Slopes;
+pub use walk::Prospect;
 
 /// A field ready for evaluation; shared by threads.
 #[derive(Clone, Debug)]
@@ -155,7 +156,7 @@ impl Program {
         let [gx, gy, gz] = gradient;
         let mut start = 0;
         while start < n {
-            let count = dispatch!(level, simd => slopes.run(simd, &self.code, points, start, noise_evaluations));
+            let count = dispatch!(level, simd => slopes.run(simd, &self.code.instructions, points, start, noise_evaluations));
             let duals = slopes.register(root);
             let end = start + count.points;
             let [x, y, z] = &duals.gradient;
@@ -197,7 +198,16 @@ impl Program {
         along.keep_noises(false);
         let mut start = 0;
         while start < n {
-            let count = self.run_along(level, points, direction, start, along, noise_evaluations);
+            let code = &self.code.instructions;
+            let count = Self::run_along(
+                level,
+                code,
+                points,
+                direction,
+                start,
+                along,
+                noise_evaluations,
+            );
             let duals = along.register(root);
             let end = start + count.points;
             numbers(&mut value[start..end], &duals.value, f64::INFINITY);
@@ -210,8 +220,8 @@ impl Program {
     /// call it, so that its loops are compiled once per SIMD level.
     #[inline(never)]
     fn run_along(
-        &self,
         level: SimdLevel,
+        instructions: &[Instruction],
         points: &Points<'_>,
         direction: [&[f64]; 3],
         start: usize,
@@ -219,25 +229,70 @@ impl Program {
         noises: &mut u64,
     ) -> Count {
         along.aim(direction, start);
-        dispatch!(level, simd => along.run(simd, &self.code, points, start, noises))
+        dispatch!(level, simd => along.run(simd, instructions, points, start, noises))
     }
 
     /// Whether [`Program::evaluate_ahead`] can bound the first root.
     pub fn looks_ahead(&self) -> bool {
-        self.walks() || ahead::bounds(&self.code)
+        ahead::bounds(&self.code)
     }
 
-    /// Whether [`Program::evaluate_ahead`] goes on, whatever the guess, as far as the first root is positive: so it
-    /// is where that is blobs alone, of a place that moves evenly along straight rays.
+    /// Whether [`Program::walk`] serves the first root: so it is where that is blobs alone, of a place that moves evenly along
+    /// straight rays.
     pub fn walks(&self) -> bool {
         self.walks
+    }
+
+    /// How far ahead of each place along its direction the first root is positive: walked to where it is not, with luck.
+    ///
+    /// `clear` gets distances that are proven for values as they are computed, up to the limit. Nothing is evaluated.
+    ///
+    /// # Panics
+    /// If the slices differ in length or are longer than a batch, or if the program does not [walk](Self::walks).
+    pub fn walk(
+        &self,
+        level: SimdLevel,
+        points: &Points<'_>,
+        direction: [&[f64]; 3],
+        prospect: Prospect<'_>,
+        scratch: &mut Scratch,
+        clear: &mut [f64],
+    ) {
+        let n = points.len();
+        assert!(
+            n <= BATCH
+                && [prospect.offset, prospect.limit, &*clear]
+                    .iter()
+                    .chain(&direction)
+                    .all(|slice| slice.len() == n),
+            "the slices are as long as the batch, and that is one"
+        );
+        if n == 0 {
+            return;
+        }
+        let (blobs, args) = walk::blobs(&self.code)
+            .filter(|_| self.walks)
+            .expect("the program walks");
+        let Scratch {
+            noise_evaluations,
+            along,
+            met,
+            ..
+        } = scratch;
+        along.prepare(&self.code);
+        along.keep_noises(false);
+        // What the blobs' place is made by alone.
+        let code = &self.code.instructions;
+        let code = &code[..code.len() - 1];
+        Self::run_along(level, code, points, direction, 0, along, noise_evaluations);
+        dispatch!(level, simd => walk::run(simd, (blobs, args), along, prospect, met, clear));
     }
 
     /// [`Program::evaluate_along`], and how far ahead of each place along its direction the first root is positive, and
     /// how far behind it.
     ///
-    /// `ahead` and `behind` get distances that are proven for values as they are computed, 0 if nothing is; of programs that
-    /// [walk](Self::walks) up to the limit ahead, of others no farther than outlooks say, and behind only if they look there.
+    /// `ahead` and `behind` get distances that are proven for values as they are computed, 0 if nothing is; no farther than
+    /// outlooks say, and behind only if they look there.
     /// `bend` holds how fast the range of the derivative is thought to spread with the distance from the place, in the
     /// field's unit per square metre, 0 if nothing is known of it, and gets how fast it was seen to.
     ///
@@ -276,15 +331,10 @@ impl Program {
         along.prepare(&self.code);
         along.keep_noises(true);
         stretches.prepare(&self.code);
-        self.run_along(level, points, direction, 0, along, noise_evaluations);
-        dispatch!(level, simd => match walk::blobs(&self.code) {
-            Some(blobs) if self.walks => {
-                ahead.copy_from_slice(outlook.most);
-                behind.fill(0.0);
-                walk::run(simd, blobs, along, root, outlook, ahead);
-            }
-            _ => stretches.run(simd, &self.code, along, outlook, root, [ahead, behind, bend]),
-        });
+        let code = &self.code.instructions;
+        Self::run_along(level, code, points, direction, 0, along, noise_evaluations);
+        let seen = [ahead, behind, bend];
+        dispatch!(level, simd => stretches.run(simd, &self.code, along, outlook, root, seen));
         let duals = along.register(root);
         numbers(value, &duals.value, f64::INFINITY);
         numbers(slope, &duals.gradient[0], 0.0);

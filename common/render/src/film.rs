@@ -38,45 +38,65 @@ impl<'a> Film<'a> {
         Self { pixels, block }
     }
 
-    /// Fills a pixel with the mean of its samples: summed in their order, each of the same weight.
+    /// Fills the pixels of a part, each with the mean of its samples: summed in their order, each of the same weight. `seen` has
+    /// those of every pixel one after the other, row by row.
     ///
     /// A sample that is not finite counts as black, and is counted.
-    pub(crate) fn put(&mut self, (x, y): (u32, u32), samples: &[Seen], counts: &mut Counts) {
-        let mut light = [0.0; 3];
-        let mut normal = DVec3::ZERO;
-        let (mut met, mut way) = (0.0, 0.0);
-        for seen in samples {
-            if seen.radiance.iter().all(|c| c.is_finite()) {
-                for (sum, radiance) in light.iter_mut().zip(seen.radiance) {
-                    *sum += radiance;
+    pub(crate) fn put(&mut self, part: Rect, seen: &[Seen], per_pixel: usize, counts: &mut Counts) {
+        if part.is_empty() {
+            return;
+        }
+        let (width, block) = (part.width() as usize, self.block);
+        let mut planes = self.pixels.chunks_exact_mut(area(block));
+        let mut planes: [&mut [f32]; CHANNEL_COUNT] =
+            std::array::from_fn(|_| planes.next().unwrap_or_default());
+        let rows = seen.chunks_exact(width * per_pixel);
+        for (y, row) in (part.y0 - block.y0..).zip(rows) {
+            let start = y as usize * block.width() as usize + (part.x0 - block.x0) as usize;
+            let mut planes = planes
+                .each_mut()
+                .map(|plane| &mut plane[start..start + width]);
+            for (x, samples) in row.chunks_exact(per_pixel).enumerate() {
+                for (plane, value) in planes.iter_mut().zip(mean(samples, counts)) {
+                    plane[x] = single(value);
                 }
-            } else {
-                counts.not_finite += 1;
-            }
-            if let Some((distance, towards)) = seen.surface {
-                met += 1.0;
-                way += distance;
-                normal += towards;
             }
         }
-        let weight = 1.0 / samples.len() as f64;
-        let values = [
-            light[0] * weight,
-            light[1] * weight,
-            light[2] * weight,
-            met * weight,
-            if met > 0.0 { way / met } else { 0.0 },
-            normal.x * weight,
-            normal.y * weight,
-            normal.z * weight,
-        ];
-        let block = self.block;
-        let place = (y - block.y0) as usize * block.width() as usize + (x - block.x0) as usize;
-        for (plane, value) in values.into_iter().enumerate() {
-            self.pixels[plane * area(block) + place] = single(value);
-        }
-        counts.pixels += 1;
+        counts.pixels += part.area();
     }
+}
+
+/// The mean of a pixel's samples, channel by channel.
+#[inline]
+fn mean(samples: &[Seen], counts: &mut Counts) -> [f64; CHANNEL_COUNT] {
+    let mut light = [0.0; 3];
+    let mut normal = DVec3::ZERO;
+    let (mut met, mut way) = (0.0, 0.0);
+    for seen in samples {
+        if seen.radiance.iter().all(|c| c.is_finite()) {
+            for (sum, radiance) in light.iter_mut().zip(seen.radiance) {
+                *sum += radiance;
+            }
+        } else {
+            counts.not_finite += 1;
+        }
+        if let Some((distance, towards)) = seen.surface {
+            met += 1.0;
+            way += distance;
+            normal += towards;
+        }
+    }
+    let weight = 1.0 / samples.len() as f64;
+    [
+        light[0] * weight,
+        light[1] * weight,
+        light[2] * weight,
+        met * weight,
+        if met > 0.0 { way / met } else { 0.0 },
+        normal.x * weight,
+        normal.y * weight,
+        normal.z * weight,
+    ]
 }
 
 /// The number of a block's pixels.
@@ -114,13 +134,14 @@ mod tests {
         let mut pixels = Vec::new();
         let mut counts = Counts::default();
         Film::new(PIXEL, &mut pixels).put(
-            (PIXEL.x0, PIXEL.y0),
+            PIXEL,
             &[
                 seen(1.0, Some((10.0, DVec3::Z))),
                 seen(0.0, None),
                 seen(3.0, Some((30.0, DVec3::X))),
                 seen(0.0, None),
             ],
+            4,
             &mut counts,
         );
         assert_eq!(pixels, [1.0, 0.0, 1.0, 0.5, 20.0, 0.25, 0.0, 0.25]);
@@ -135,7 +156,7 @@ mod tests {
             radiance: [red, 1.0, 1.0],
             surface: None,
         });
-        Film::new(PIXEL, &mut pixels).put((PIXEL.x0, PIXEL.y0), &seen, &mut counts);
+        Film::new(PIXEL, &mut pixels).put(PIXEL, &seen, 4, &mut counts);
         assert!(pixels.iter().all(|value| value.is_finite()));
         assert_eq!(counts.not_finite, 2);
     }

@@ -15,16 +15,16 @@ use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
 use crate::grids;
 use crate::places::Places;
-use crate::sample::order::arrange;
+use crate::sample::order::{along_curve, arrange};
 use crate::sample::spline::FILTER_ORDER_MAX;
 use crate::sample::strata::RAYS_MAX;
 use crate::sample::{Sample, Strata};
-use crate::shade::light::Lit;
+use crate::shade::light::{Lit, Lits};
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
 use crate::times::{Clock, Part, Stopwatch, Times};
 use crate::trace::{Goal, Hit, Means, Ray, Surface, Technique, Tracer};
-use crate::view::{Sight, View};
+use crate::view::{Rows, Sight, View};
 
 /// Samples that are worked on together, about: enough to fill batches, few enough for the cache.
 const TOGETHER: usize = 8192;
@@ -215,29 +215,31 @@ impl ImageRenderer {
             }
             work.tracer.stopwatch.begin(Part::Sampling);
             work.clear();
-            let places = (part.y0..part.y1).flat_map(|y| (part.x0..part.x1).map(move |x| (x, y)));
-            let level = self.surface.level;
-            self.strata.of_pixels(level, part, &mut work.samples);
-            let corner = [part.x0, part.y0];
-            if Technique::Curve.is_used(self.surface.without) {
-                arrange(&mut work.samples, corner, self.slices, &mut work.from);
-            } else {
-                work.from.clear();
-                work.from.extend((0..).take(work.samples.len()));
-            }
+            self.take(part, &mut work);
             self.see(&mut work, cancel, &mut counts)?;
             work.tracer.stopwatch.begin(Part::Film);
-            work.put_back();
-            let seen = work.in_order.chunks_exact(self.strata.per_pixel());
-            for (place, seen) in places.zip(seen) {
-                film.put(place, seen, &mut counts);
-            }
+            film.put(part, &work.seen, self.strata.per_pixel(), &mut counts);
         }
         counts.noise_evaluations += work.tracer.scratch.noise_evaluations;
         work.tracer.stopwatch.stop();
         let times = work.tracer.stopwatch.times;
         self.spare().push(work);
         Ok((counts, times))
+    }
+
+    /// Takes the samples of a part's pixels, in an order in which neighbours share what they can.
+    fn take(&self, part: Rect, work: &mut Work) {
+        let Work { samples, from, .. } = work;
+        self.strata.of_pixels(self.surface.level, part, samples);
+        if !Technique::Curve.is_used(self.surface.without) {
+            from.extend((0..).take(samples.len()));
+        } else if self.strata.per_pixel() == 1 {
+            // Then the order of pixels is that of samples.
+            along_curve(part, |place| from.push(place));
+            *samples = from.iter().map(|&place| samples[place as usize]).collect();
+        } else {
+            arrange(samples, [part.x0, part.y0], self.slices, from);
+        }
     }
 
     fn spare(&self) -> MutexGuard<'_, Vec<Box<Work>>> {
@@ -253,11 +255,17 @@ impl ImageRenderer {
     ) -> Result<(), Cancelled> {
         counts.samples += work.samples.len() as u64;
         counts.rays += work.samples.len() as u64;
-        for sample in &work.samples {
-            let sight = self.view.sight(sample);
-            work.sights.push(sight);
-            work.rays.push(self.surface.ray(&sight));
-        }
+        let Work {
+            samples,
+            rows,
+            rays,
+            ..
+        } = work;
+        rays.reserve(samples.len());
+        self.view
+            .sights(self.surface.level, samples, rows, |sight| {
+                rays.push(self.surface.ray(&sight));
+            });
         work.tracer.trace(
             &self.surface,
             Goal::Distance,
@@ -279,18 +287,18 @@ impl ImageRenderer {
     fn touch(&self, work: &mut Work, counts: &mut Counts) {
         let Work {
             hits,
-            sights,
+            rays,
             touched,
             places,
             tracer,
             ..
         } = work;
-        for (index, (hit, sight)) in hits.iter().zip(sights.iter()).enumerate() {
+        for (index, (hit, ray)) in hits.iter().zip(rays.iter()).enumerate() {
             let Some(distance) = hit.distance() else {
                 continue;
             };
-            let place = sight.origin + sight.direction * distance;
-            places.push(place, self.surface.footprint.at(distance), sight.time);
+            let place = ray.origin + ray.direction * distance;
+            places.push(place, self.surface.footprint.at(distance), ray.time);
             touched.push(Touched {
                 sample: index,
                 distance,
@@ -358,9 +366,9 @@ impl ImageRenderer {
         cancel: &AtomicBool,
         counts: &mut Counts,
     ) -> Result<(), Cancelled> {
-        work.rays.clear();
-        work.hits.clear();
         work.asking.clear();
+        work.asking_rays.clear();
+        work.hits.clear();
         for (index, touched) in work.touched.iter_mut().enumerate() {
             if touched.normal.dot(self.sky.sun) <= 0.0 {
                 continue;
@@ -369,23 +377,23 @@ impl ImageRenderer {
             if !self.shadows {
                 continue;
             }
-            let sight = &work.sights[touched.sample];
+            let ray = &work.rays[touched.sample];
             let footprint = self.surface.footprint.at(touched.distance);
             let origin = touched.place + touched.normal * (LIFT * footprint);
             work.asking.push(index);
-            work.rays.push(Ray {
+            work.asking_rays.push(Ray {
                 origin,
                 direction: self.sky.sun,
-                from_eye: origin - sight.origin,
-                time: sight.time,
+                from_eye: origin - ray.origin,
+                time: ray.time,
                 grid: self.surface.shadow_grid(touched.distance),
             });
         }
-        counts.shadow_rays += work.rays.len() as u64;
+        counts.shadow_rays += work.asking_rays.len() as u64;
         work.tracer.trace(
             &self.surface,
             Goal::Occlusion,
-            &work.rays,
+            &work.asking_rays,
             cancel,
             counts,
             &mut work.hits,
@@ -401,7 +409,7 @@ impl ImageRenderer {
 
     /// Gives every sample its colour.
     fn shade(&self, work: &mut Work) {
-        work.seen.resize(work.sights.len(), Seen::NOTHING);
+        work.seen.resize(work.rays.len(), Seen::NOTHING);
         self.shade_surface(work);
         work.tracer.stopwatch.begin(Part::Sky);
         self.shade_sky(work);
@@ -410,19 +418,23 @@ impl ImageRenderer {
     /// Colours the samples that met the surface.
     fn shade_surface(&self, work: &mut Work) {
         let Work {
-            sights,
+            rays,
+            from,
             touched,
             places,
             fields,
+            lits,
             tracer,
             seen,
             ..
         } = work;
         for first in (0..touched.len()).step_by(BATCH) {
             let n = BATCH.min(touched.len() - first);
-            for (i, touched) in touched[first..first + n].iter().enumerate() {
-                let facing = touched.normal.dot(sights[touched.sample].direction);
-                places.widen(first + i, Patch::longer(facing));
+            if self.palette.has_fields() {
+                for (i, touched) in touched[first..first + n].iter().enumerate() {
+                    let facing = touched.normal.dot(rays[touched.sample].direction);
+                    places.widen(first + i, Patch::longer(facing));
+                }
             }
             self.palette.evaluate(
                 self.surface.level,
@@ -432,7 +444,7 @@ impl ImageRenderer {
             );
             for i in 0..n {
                 let touched = &touched[first + i];
-                let direction = sights[touched.sample].direction;
+                let direction = rays[touched.sample].direction;
                 let patch = Patch::new(
                     touched.normal,
                     direction,
@@ -446,8 +458,13 @@ impl ImageRenderer {
                     albedo: self.palette.albedo(fields, i, &patch),
                     sun: touched.sun,
                 };
-                let radiance = lit.radiance(&self.sky);
-                seen[touched.sample] = Seen {
+                lits.set(i, &lit);
+            }
+            lits.reflect(self.surface.level, &self.sky);
+            for (i, touched) in touched[first..first + n].iter().enumerate() {
+                let direction = rays[touched.sample].direction;
+                let radiance = lits.radiance(i);
+                seen[from[touched.sample] as usize] = Seen {
                     radiance: self.sky.through_air(radiance, direction, touched.distance),
                     surface: Some((touched.distance, touched.normal)),
                 };
@@ -458,7 +475,8 @@ impl ImageRenderer {
     /// Colours the samples that met nothing: sun, sky and clouds.
     fn shade_sky(&self, work: &mut Work) {
         let Work {
-            sights,
+            rays,
+            from,
             tracer,
             seen,
             scanned,
@@ -467,14 +485,20 @@ impl ImageRenderer {
         } = work;
         scanned.clear();
         crossings.clear();
-        for (index, (sight, seen)) in sights.iter().zip(seen).enumerate() {
+        for (index, (ray, &place)) in rays.iter().zip(&*from).enumerate() {
+            let seen = &mut seen[place as usize];
             if seen.surface.is_some() {
                 continue;
             }
-            seen.radiance = self.sky.background(sight.direction);
+            seen.radiance = self.sky.background(ray.direction);
             let crossing = self.clouds.as_ref().and_then(|clouds| {
+                let sight = Sight {
+                    origin: ray.origin,
+                    direction: ray.direction,
+                    time: ray.time,
+                };
                 let angle = self.surface.footprint.angle;
-                clouds.meet(self.sky.sun, sight, angle, scanned)
+                clouds.meet(self.sky.sun, &sight, angle, scanned)
             });
             crossings.extend(crossing.map(|crossing| (index, crossing)));
         }
@@ -482,8 +506,9 @@ impl ImageRenderer {
         clouds.scan(self.surface.level, &mut tracer.scratch, scanned);
         let light = self.sky.on_clouds();
         for &(index, crossing) in &*crossings {
-            let veil = clouds.veil(crossing, sights[index].direction, &light, scanned);
-            work.seen[index].radiance = veil.over(work.seen[index].radiance);
+            let veil = clouds.veil(crossing, rays[index].direction, &light, scanned);
+            let seen = &mut seen[from[index] as usize];
+            seen.radiance = veil.over(seen.radiance);
         }
     }
 }
@@ -505,17 +530,19 @@ struct Work {
     samples: Vec<Sample>,
     /// From which place each of the samples comes.
     from: Vec<u32>,
-    sights: Vec<Sight>,
+    /// Where rays are computed.
+    rows: Box<Rows>,
     rays: Vec<Ray>,
     hits: Vec<Hit>,
     touched: Vec<Touched>,
     places: Places,
     /// Which of `touched` each shadow ray belongs to.
     asking: Vec<usize>,
+    asking_rays: Vec<Ray>,
+    /// What the samples saw, pixel by pixel.
     seen: Vec<Seen>,
-    /// The same, pixel by pixel.
-    in_order: Vec<Seen>,
     fields: Fields,
+    lits: Box<Lits>,
     scanned: Scanned,
     /// Which samples see the layer of clouds, and where.
     crossings: Vec<(usize, Crossing)>,
@@ -523,18 +550,9 @@ struct Work {
 }
 
 impl Work {
-    /// Puts what the samples saw into the order of their pixels.
-    fn put_back(&mut self) {
-        // Every place is written, so that what was there does not matter.
-        self.in_order.resize(self.seen.len(), Seen::NOTHING);
-        for (seen, &place) in self.seen.iter().zip(&self.from) {
-            self.in_order[place as usize] = *seen;
-        }
-    }
-
     fn clear(&mut self) {
         self.samples.clear();
-        self.sights.clear();
+        self.from.clear();
         self.rays.clear();
         self.hits.clear();
         self.touched.clear();

@@ -1,10 +1,12 @@
 //! The camera of one image: poses over the shutter, and the ray of every sample.
 
+use field::{BATCH, SimdLevel};
 use glam::DVec3;
 use scene::Pose;
 use scene::description::{Camera, Film, Projection};
 
 use crate::sample::Sample;
+use crate::trace::batch::Lanes;
 
 /// Spans of the shutter: within each the camera moves along straight lines.
 const SPANS: usize = 256;
@@ -35,6 +37,27 @@ pub(crate) struct Sight {
     pub(crate) direction: DVec3,
     /// Seconds from image 0.
     pub(crate) time: f64,
+}
+
+/// Memory in which rays of sight are computed, lane by lane.
+pub(crate) struct Rows {
+    x: Lanes,
+    y: Lanes,
+    share: Lanes,
+    origin: [Lanes; 3],
+    direction: [Lanes; 3],
+}
+
+impl Default for Rows {
+    fn default() -> Self {
+        Self {
+            x: [0.0; BATCH],
+            y: [0.0; BATCH],
+            share: [0.0; BATCH],
+            origin: [[0.0; BATCH]; 3],
+            direction: [[0.0; BATCH]; 3],
+        }
+    }
 }
 
 /// How the places of one image become rays.
@@ -128,28 +151,80 @@ impl View {
             reason = "an instant is between 0 and 1"
         )]
         let span = (along as usize).min(self.poses.len() - 2);
-        let (a, b) = (&self.poses[span], &self.poses[span + 1]);
+        let ends = [&self.poses[span], &self.poses[span + 1]];
         let share = along - span as f64;
-        let between = |of: fn(&Pose) -> [f64; 3]| {
-            let (a, b) = (DVec3::from(of(&a.0)), DVec3::from(of(&b.0)));
+        let (origin, direction) = self.line(ends, share, sample.place);
+        Sight {
+            origin,
+            direction,
+            time: self.time(sample),
+        }
+    }
+
+    /// The rays of samples, one after the other.
+    pub(crate) fn sights(
+        &self,
+        level: SimdLevel,
+        samples: &[Sample],
+        rows: &mut Rows,
+        mut see: impl FnMut(Sight),
+    ) {
+        let [first, last] = &self.poses[..] else {
+            samples.iter().for_each(|sample| see(self.sight(sample)));
+            return;
+        };
+        // Within one span all rays have the same poses: they are computed together.
+        for samples in samples.chunks(BATCH) {
+            for (i, sample) in samples.iter().enumerate() {
+                [rows.x[i], rows.y[i]] = sample.place;
+                rows.share[i] = sample.instant;
+            }
+            level.vectorize(
+                #[inline(always)]
+                || {
+                    for i in 0..BATCH {
+                        let place = [rows.x[i], rows.y[i]];
+                        let (origin, direction) = self.line([first, last], rows.share[i], place);
+                        for axis in 0..3 {
+                            rows.origin[axis][i] = origin[axis];
+                            rows.direction[axis][i] = direction[axis];
+                        }
+                    }
+                },
+            );
+            for (i, sample) in samples.iter().enumerate() {
+                see(Sight {
+                    origin: [0, 1, 2].map(|axis| rows.origin[axis][i]).into(),
+                    direction: [0, 1, 2].map(|axis| rows.direction[axis][i]).into(),
+                    time: self.time(sample),
+                });
+            }
+        }
+    }
+
+    fn time(&self, sample: &Sample) -> f64 {
+        self.start + self.shutter * sample.instant
+    }
+
+    /// Where the ray through a place of the image begins, and its direction, a share of the way from one pose to another.
+    #[inline(always)]
+    fn line(&self, [a, b]: [&(Pose, f64); 2], share: f64, place: [f64; 2]) -> (DVec3, DVec3) {
+        let between = |a: [f64; 3], b: [f64; 3]| {
+            let (a, b) = (DVec3::from(a), DVec3::from(b));
             a + (b - a) * share
         };
         let pixel = a.1 + (b.1 - a.1) * share;
-        let across = (sample.place[0] - self.middle[0]) * pixel;
-        let up = (self.middle[1] - sample.place[1]) * pixel;
-        let sideways = between(|pose| pose.right) * across + between(|pose| pose.up) * up;
-        let eye = between(|pose| pose.eye);
-        let forward = between(|pose| pose.forward);
+        let across = (place[0] - self.middle[0]) * pixel;
+        let up = (self.middle[1] - place[1]) * pixel;
+        let sideways = between(a.0.right, b.0.right) * across + between(a.0.up, b.0.up) * up;
+        let eye = between(a.0.eye, b.0.eye);
+        let forward = between(a.0.forward, b.0.forward);
         let (origin, towards) = if self.parallel {
             (eye + sideways, forward)
         } else {
             (eye, forward + sideways)
         };
-        Sight {
-            origin,
-            direction: towards * (1.0 / towards.dot(towards).sqrt()),
-            time: self.start + self.shutter * sample.instant,
-        }
+        (origin, towards * (1.0 / towards.dot(towards).sqrt()))
     }
 }
 

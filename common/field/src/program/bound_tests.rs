@@ -3,7 +3,7 @@
 use crate::hash::{hash, unit};
 use crate::program::tests::{fig_5_6, noise_zoo, planet, scaled, values, zoo};
 use crate::{
-    BATCH, Graph, Interval, NodeId, Op, Outlook, Points, Program, Region, Scratch, Sides,
+    BATCH, Graph, Interval, NodeId, Op, Outlook, Points, Program, Prospect, Region, Scratch, Sides,
     SimdLevel, Surroundings,
 };
 
@@ -270,6 +270,20 @@ fn clear(program: &Program, level: SimdLevel, asked: &Asked<'_>) -> [Vec<f64>; 2
         };
         let (mut value, mut along) = (vec![0.0; n], vec![0.0; n]);
         let (ahead, behind) = (&mut ahead[batch.clone()], &mut behind[batch]);
+        if program.walks() {
+            let (offset, limit) = (&offset[..], &limit[..]);
+            let prospect = Prospect { offset, limit };
+            program.walk(
+                level,
+                &points,
+                [&dx, &dy, &dz],
+                prospect,
+                &mut scratch,
+                ahead,
+            );
+            behind.fill(0.0);
+            continue;
+        }
         let out = [&mut value[..], &mut along, ahead, behind, &mut bend];
         program.evaluate_ahead(level, &points, [&dx, &dy, &dz], outlook, &mut scratch, out);
     }
@@ -289,7 +303,7 @@ impl Pairs {
         let Some(taylor) = program.taylor(&self.around) else {
             return;
         };
-        if !program.looks_ahead() {
+        if !program.looks_ahead() && !program.walks() {
             return;
         }
         let n = f.len().min(4_000);

@@ -73,12 +73,12 @@ impl<const N: usize> Slopes<N> {
         self.tape.keeps = keeps;
     }
 
-    /// Evaluates the points from `start` on, as many as a batch holds.
+    /// Evaluates instructions at the points from `start` on, as many as a batch holds.
     #[inline(always)]
     pub(crate) fn run<S: Simd>(
         &mut self,
         simd: S,
-        code: &Code,
+        instructions: &[Instruction],
         points: &Points<'_>,
         start: usize,
         noises: &mut u64,
@@ -91,7 +91,7 @@ impl<const N: usize> Slopes<N> {
                 .expect("there is a register for each input")
                 .value
         });
-        for instruction in &code.instructions {
+        for instruction in instructions {
             *noises += self.step(simd, instruction, count);
             std::mem::swap(&mut self.registers[instruction.result], &mut self.result);
         }

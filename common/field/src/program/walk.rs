@@ -2,11 +2,10 @@
 
 use fearless_simd::Simd;
 
-use super::ahead::Outlook;
 use super::code::{Code, FOOTPRINT, INPUTS, Operation};
 use super::slopes::Slopes;
 use crate::arithmetic::{Binary, Unary};
-use crate::shape::{Blobs, Shape, Walk};
+use crate::shape::{Blobs, Met, Shape, Walk};
 
 /// The blobs that the code's root is, and the registers of the place that they are asked about.
 pub(crate) fn blobs(code: &Code) -> Option<(&Blobs, [usize; 3])> {
@@ -57,25 +56,32 @@ impl Motion {
     }
 }
 
-/// How far ahead of some places no root can be, from `ahead` as a first guess, which it replaces. What the code
-/// gave at the places is in `along`.
+/// What is known of the field and wanted of the rays, lane by lane.
+#[derive(Clone, Copy, Debug)]
+pub struct Prospect<'a> {
+    /// What values may be wrong by, in the field's unit: rounding; of [`crate::Taylor`].
+    pub offset: &'a [f64],
+    /// How far ahead anything is worth knowing, metres.
+    pub limit: &'a [f64],
+}
+
+/// How far ahead of some places no root can be. What the code that makes the blobs' place gave there is in `along`.
 #[inline(always)]
 pub(crate) fn run<S: Simd>(
     simd: S,
     (blobs, args): (&Blobs, [usize; 3]),
     along: &Slopes<1>,
-    root: usize,
-    outlook: Outlook<'_>,
-    ahead: &mut [f64],
+    prospect: Prospect<'_>,
+    met: &mut Met,
+    clear: &mut [f64],
 ) {
     let lanes = args.map(|arg| along.register(arg));
     let walk = Walk {
         place: lanes.map(|part| &part.value),
         direction: lanes.map(|part| &part.gradient[0]),
         world: [0, 1, 2].map(|axis| &along.register(axis).value),
-        value: &along.register(root).value,
-        offset: outlook.offset,
-        limit: outlook.limit,
+        offset: prospect.offset,
+        limit: prospect.limit,
     };
-    blobs.walk(simd, walk, ahead);
+    blobs.walk(simd, walk, met, clear);
 }

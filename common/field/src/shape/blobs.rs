@@ -1,6 +1,7 @@
 //! Blobby surfaces, thesis eq. (2.9): points whose influences add up.
 
 mod lanes;
+mod near;
 mod piece;
 mod walk;
 
@@ -13,7 +14,7 @@ use super::sum::{Rules, Summed};
 use super::supports::Supports;
 use super::within::{Extent, Known, Within};
 use crate::interval::{Interval, smaller};
-pub(crate) use walk::Walk;
+pub(crate) use walk::{Met, Walk};
 
 /// T − Σ aᵢ h(‖x − xᵢ‖/rᵢ), and beyond all supports the far field of (7.9).
 #[derive(Clone, PartialEq, Debug)]

@@ -32,7 +32,7 @@ use crate::range::Arithmetic;
 use bend::Bend;
 use bernstein::Bernstein;
 use blend::Blend;
-pub(crate) use blobs::{Blobs, Walk};
+pub(crate) use blobs::{Blobs, Met, Walk};
 use convolution::Convolution;
 use distance::Distances;
 pub(crate) use lanes::Rows;

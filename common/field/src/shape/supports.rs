@@ -8,6 +8,25 @@ use crate::interval::Interval;
 /// Terms of one group.
 const GROUP: usize = 8;
 
+/// By so much tubes are wider than they need be, for rounding.
+const ROOM: f64 = 1.0 + 1e-6;
+
+/// The same, of how far from their centres balls are looked at.
+const ROUNDINGS: f64 = 256.0 * f64::EPSILON;
+
+/// What holds some straight rays: at the way t along it, all that lies within `radius` + `spread` · t of its axis, as far
+/// as that may be.
+pub(crate) struct Tube {
+    pub(crate) start: [f64; 3],
+    pub(crate) direction: [f64; 3],
+    /// ‖direction‖⁻².
+    pub(crate) inverse: f64,
+    pub(crate) radius: f64,
+    pub(crate) spread: f64,
+    /// No ray takes longer for a metre.
+    pub(crate) slowness: f64,
+}
+
 /// The supports of a sum's terms, in the order in which they are summed.
 #[derive(Clone, PartialEq, Debug)]
 pub(crate) struct Supports {
@@ -20,6 +39,9 @@ pub(crate) struct Supports {
 #[derive(Clone, PartialEq, Debug)]
 struct Group {
     hull: Extent,
+    /// Balls around the boxes, which may be infinite; of −∞ where there is none.
+    centre: [[f64; GROUP]; 3],
+    radius: [f64; GROUP],
     min: [[f64; GROUP]; 3],
     max: [[f64; GROUP]; 3],
 }
@@ -27,12 +49,6 @@ struct Group {
 impl Supports {
     /// Sorts the terms so that neighbours in the list are neighbours in space, and boxes them.
     pub(crate) fn sorted<T>(terms: &mut [T], of: impl Fn(&T) -> Extent) -> Self {
-        let centre = |extent: &Extent| {
-            [0, 1, 2].map(|k| {
-                let middle = 0.5 * (extent.min[k] + extent.max[k]);
-                if middle.is_nan() { 0.0 } else { middle }
-            })
-        };
         let centres: Vec<[f64; 3]> = terms.iter().map(|term| centre(&of(term))).collect();
         let frame = Extent::around(&centres, 0.0);
         terms.sort_by_key(|term| morton(centre(&of(term)), &frame));
@@ -47,6 +63,18 @@ impl Supports {
     #[inline]
     pub(crate) fn at(&self, place: [f64; 3], visit: impl FnMut(usize)) {
         self.over(&place.map(Interval::point), visit);
+    }
+
+    /// Calls `visit` with every term whose support may meet the tube, in order.
+    #[inline(always)]
+    pub(crate) fn along(&self, tube: &Tube, mut visit: impl FnMut(usize)) {
+        for (group, terms) in self.groups.iter().enumerate() {
+            let mut meeting = terms.along(tube);
+            while meeting != 0 {
+                visit(group * GROUP + meeting.trailing_zeros() as usize);
+                meeting &= meeting - 1;
+            }
+        }
     }
 
     /// Calls `visit` with every term whose support meets the box, in order.
@@ -69,11 +97,44 @@ impl Group {
         // Where there is no term nothing is met.
         let empty = Extent::around(&[], 0.0);
         let of = |i: usize| extents.get(i).unwrap_or(&empty);
+        let radius = |i: usize| {
+            let [x, y, z] = [0, 1, 2].map(|k| 0.5 * (of(i).max[k] - of(i).min[k]));
+            if i < extents.len() {
+                (x * x + y * y + z * z).sqrt()
+            } else {
+                f64::NEG_INFINITY
+            }
+        };
         Self {
             hull: hull(extents),
+            centre: [0, 1, 2].map(|k| std::array::from_fn(|i| centre(of(i))[k])),
+            radius: std::array::from_fn(radius),
             min: [0, 1, 2].map(|k| std::array::from_fn(|i| of(i).min[k])),
             max: [0, 1, 2].map(|k| std::array::from_fn(|i| of(i).max[k])),
         }
+    }
+
+    /// Which terms may meet the tube, as bits.
+    ///
+    /// A ray that is within r of a centre has gone no farther than that is from its start, and r; as wide as the tube is there,
+    /// the centre must be near the axis.
+    #[inline(always)]
+    fn along(&self, tube: &Tube) -> u32 {
+        let ([cx, cy, cz], [x, y, z]) = (&self.centre, tube.start);
+        let [dx, dy, dz] = tube.direction;
+        let mut meeting = 0;
+        for i in 0..GROUP {
+            let (x, y, z) = (cx[i] - x, cy[i] - y, cz[i] - z);
+            let t = (x * dx + y * dy + z * dz) * tube.inverse;
+            let (ax, ay, az) = (x - dx * t, y - dy * t, z - dz * t);
+            let away = (x * x + y * y + z * z).sqrt();
+            let near = self.radius[i] + tube.radius + ROUNDINGS * away;
+            let way = (away + near) * tube.slowness;
+            let wide = (near + tube.spread * way) * ROOM;
+            let misses = (ax * ax + ay * ay + az * az > wide * wide) | (near < 0.0);
+            meeting |= u32::from(!misses) << i;
+        }
+        meeting
     }
 
     /// Which terms meet the box, as bits.
@@ -92,6 +153,14 @@ impl Group {
         }
         meeting
     }
+}
+
+/// The middle of a box; 0 along axes on which it has none.
+fn centre(extent: &Extent) -> [f64; 3] {
+    [0, 1, 2].map(|k| {
+        let middle = 0.5 * (extent.min[k] + extent.max[k]);
+        if middle.is_nan() { 0.0 } else { middle }
+    })
 }
 
 fn hull(extents: &[Extent]) -> Extent {

@@ -2,6 +2,8 @@
 //!
 //! Rays next to each other share what they can (`trace::bundle`); nothing that they see depends on the order.
 
+use model::Rect;
+
 use super::Sample;
 
 /// Cells along a pixel's side.
@@ -12,6 +14,27 @@ const BEFORE: f64 = 1024.0;
 
 /// Bits that tell samples apart, beside 16 of the slice and 32 of the curve.
 const INDEX_BITS: u32 = 16;
+
+/// Calls `visit` with every pixel of a part along a Morton curve about its first one: with its place row by row.
+pub(crate) fn along_curve(part: Rect, mut visit: impl FnMut(u32)) {
+    let longer = part.width().max(part.height());
+    square(part, [0, 0], longer.next_power_of_two(), &mut visit);
+}
+
+/// The pixels of a square that begins so far from the part's first one.
+fn square(part: Rect, [x, y]: [u32; 2], side: u32, visit: &mut impl FnMut(u32)) {
+    if x >= part.width() || y >= part.height() {
+        return;
+    }
+    if side == 1 {
+        visit(y * part.width() + x);
+        return;
+    }
+    let half = side / 2;
+    for [right, down] in [[0, 0], [half, 0], [0, half], [half, half]] {
+        square(part, [x + right, y + down], half, visit);
+    }
+}
 
 /// Puts samples in order and tells from which place each one comes.
 ///
@@ -113,6 +136,26 @@ mod tests {
             assert_eq!(keys, compared, "{mask:x}");
         }
         sort(&mut Vec::new());
+    }
+
+    #[test]
+    fn pixels_of_any_part_are_visited_once_along_the_curve() {
+        for (width, height) in [(1, 1), (8, 8), (5, 7), (1, 9), (300, 2)] {
+            let part = Rect {
+                x0: 64,
+                y0: 32,
+                x1: 64 + width,
+                y1: 32 + height,
+            };
+            let (mut seen, mut codes) = (Vec::new(), Vec::new());
+            along_curve(part, |place| {
+                seen.push(place);
+                codes.push(spread(place % width) | spread(place / width) << 1);
+            });
+            assert!(codes.is_sorted());
+            seen.sort_unstable();
+            assert_eq!(seen, (0..width * height).collect::<Vec<_>>());
+        }
     }
 
     #[test]

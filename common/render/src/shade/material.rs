@@ -82,6 +82,11 @@ impl Palette {
         })
     }
 
+    /// Whether it has fields of its own.
+    pub(crate) fn has_fields(&self) -> bool {
+        self.fields.is_some()
+    }
+
     /// Evaluates the material's fields at a batch of places.
     pub(crate) fn evaluate(
         &self,

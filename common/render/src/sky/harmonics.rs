@@ -49,6 +49,7 @@ impl Irradiance {
     }
 
     /// Irradiance of a surface of that unit normal; never negative.
+    #[inline(always)]
     pub(crate) fn at(&self, normal: DVec3) -> Colour {
         let basis = basis(normal);
         [0, 1, 2].map(|c| {
@@ -59,6 +60,7 @@ impl Irradiance {
 }
 
 /// The first nine real spherical harmonics.
+#[inline(always)]
 fn basis(d: DVec3) -> [f64; 9] {
     [
         0.282_094_791_773_878_14,

@@ -16,7 +16,7 @@ pub(crate) use air::Colour;
 use clouds::Light;
 pub(crate) use clouds::{Clouds, Crossing, Scanned};
 use dome::Dome;
-use harmonics::Irradiance;
+pub(crate) use harmonics::Irradiance;
 
 use crate::crew::Crew;
 
@@ -36,7 +36,7 @@ pub(crate) struct Sky {
     /// Irradiance of a surface facing the sun, at the ground.
     pub(crate) sunlight: Colour,
     /// Irradiance from everywhere else.
-    ambient: Irradiance,
+    pub(crate) ambient: Irradiance,
     /// The same for clouds: the mean of what comes from above and below.
     on_clouds: Colour,
     air: Option<Layer>,
@@ -143,11 +143,6 @@ impl Sky {
             sunlight: self.sunlight,
             ambient: self.on_clouds,
         }
-    }
-
-    /// Irradiance from sky and ground on a surface of that unit normal.
-    pub(crate) fn ambient(&self, normal: DVec3) -> Colour {
-        self.ambient.at(normal)
     }
 
     /// What is seen of `radiance` at that distance in a direction: part of it is lost, and the

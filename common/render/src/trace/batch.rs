@@ -1,6 +1,6 @@
 //! Places along many rays, and the field's values there: structure of arrays.
 
-use field::{BATCH, Outlook, Points, Scratch, Sides};
+use field::{BATCH, Outlook, Points, Prospect, Scratch, Sides};
 use glam::DVec3;
 
 use super::surface::Surface;
@@ -176,6 +176,23 @@ impl Batch {
         );
         self.value[..n].copy_from_slice(&value[..n]);
         self.slope[..n].copy_from_slice(&slope[..n]);
+    }
+
+    /// How far along the paths the field of a surface that walks is clear from the places on.
+    pub(crate) fn walk(
+        &self,
+        surface: &Surface,
+        n: usize,
+        paths: &Paths,
+        prospect: Prospect<'_>,
+        clear: &mut [f64],
+        scratch: &mut Scratch,
+    ) {
+        let points = self.points(n, paths);
+        let [x, y, z] = &paths.direction;
+        let direction = [&x[..n], &y[..n], &z[..n]];
+        let program = &surface.program;
+        program.walk(surface.level, &points, direction, prospect, scratch, clear);
     }
 
     /// Evaluates the field at the places, its derivative along the paths, and how far ahead and behind it is positive, as

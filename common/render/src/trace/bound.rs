@@ -13,37 +13,170 @@ const ROOM: f64 = 1e-9;
 /// The first is never too large and the last never too small: f > 0 before and
 /// beyond, by the bound's own promise.
 pub(crate) fn clip(bound: &Bound, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
-    let (start, end) = match *bound {
-        Bound::Shell { inner, outer } => {
-            let (start, end) = sphere(outer * (1.0 + ROOM), origin, direction)?;
-            // What goes into the inner sphere has met the surface before.
-            match sphere(inner * (1.0 - ROOM), origin, direction) {
-                Some((near, _)) if near > 0.0 && inner > 0.0 => (start, near),
-                _ => (start, end),
-            }
-        }
-        Bound::Slab { low, high } => {
-            let room = ROOM * (low.abs() + high.abs() + origin.z.abs());
-            slab(low - room, high + room, origin.z, direction.z)?
-        }
-        Bound::Box { min, max } => {
-            let (min, max) = (DVec3::from(min), DVec3::from(max));
-            let room = (min.abs() + max.abs() + origin.abs()) * ROOM;
-            let (low, high) = (min - room, max + room);
-            let mut span = (f64::NEG_INFINITY, f64::INFINITY);
-            for axis in 0..3 {
-                let (near, far) = slab(low[axis], high[axis], origin[axis], direction[axis])?;
-                span = (
-                    if near > span.0 { near } else { span.0 },
-                    if far < span.1 { far } else { span.1 },
-                );
-            }
-            span
-        }
+    let (origin, direction) = (origin.to_array(), direction.to_array());
+    let (start, end) = match Region::of(bound) {
+        Region::Ball(ball) => ball.span(origin, direction),
+        Region::Shell(shell) => shell.span(origin, direction),
+        Region::Slab(slab) => slab.span(origin, direction),
+        Region::Block(block) => block.span(origin, direction),
     };
-    let start = if start > 0.0 { start } else { 0.0 };
-    let end = if end < FAR { end } else { FAR };
     (start <= end).then_some((start, end))
+}
+
+/// A bound, one type for each way of clipping rays to it. Each clips without a branch, for loops over many rays.
+pub(super) enum Region {
+    Ball(Ball),
+    Shell(Shell),
+    Slab(Slab),
+    Block(Block),
+}
+
+impl Region {
+    pub(super) fn of(bound: &Bound) -> Self {
+        match *bound {
+            Bound::Shell { inner, outer } => {
+                let outer = Ball(outer * (1.0 + ROOM));
+                if inner > 0.0 {
+                    let inner = Ball(inner * (1.0 - ROOM));
+                    Self::Shell(Shell { inner, outer })
+                } else {
+                    Self::Ball(outer)
+                }
+            }
+            Bound::Slab { low, high } => Self::Slab(Slab { low, high }),
+            Bound::Box { min, max } => Self::Block(Block { min, max }),
+        }
+    }
+}
+
+/// What holds the surface.
+pub(super) trait Holds {
+    /// The distances between which a ray is inside, neither below 0 nor above [`FAR`]; the first is above the second where it
+    /// never is.
+    fn span(&self, origin: [f64; 3], direction: [f64; 3]) -> (f64, f64);
+}
+
+/// Where nothing is inside.
+const NONE: (f64, f64) = (f64::INFINITY, f64::NEG_INFINITY);
+
+/// The part of a span in front of the origin.
+#[inline(always)]
+fn ahead((start, end): (f64, f64)) -> (f64, f64) {
+    (
+        if start > 0.0 { start } else { 0.0 },
+        if end < FAR { end } else { FAR },
+    )
+}
+
+/// A ball about the origin of that radius.
+pub(super) struct Ball(f64);
+
+impl Holds for Ball {
+    #[inline(always)]
+    fn span(&self, origin: [f64; 3], direction: [f64; 3]) -> (f64, f64) {
+        ahead(self.within(origin, direction))
+    }
+}
+
+impl Ball {
+    /// Without losing an eye close above a planet to rounding.
+    #[inline(always)]
+    fn within(&self, origin: [f64; 3], direction: [f64; 3]) -> (f64, f64) {
+        let Self(radius) = *self;
+        let ([x, y, z], [dx, dy, dz]) = (origin, direction);
+        let towards = -(x * dx + y * dy + z * dz);
+        let distance = (x * x + y * y + z * z).sqrt();
+        let power = (distance - radius) * (distance + radius);
+        let discriminant = towards * towards - power;
+        let misses = discriminant < 0.0;
+        let root = if misses { 0.0 } else { discriminant }.sqrt();
+        // The root of larger size first: the other follows without cancellation.
+        let large = if towards >= 0.0 {
+            towards + root
+        } else {
+            towards - root
+        };
+        let other = if large == 0.0 { 0.0 } else { power / large };
+        let is_last = large >= other;
+        let near = if is_last { other } else { large };
+        let far = if is_last { large } else { other };
+        (
+            if misses { NONE.0 } else { near },
+            if misses { NONE.1 } else { far },
+        )
+    }
+}
+
+/// A ball without another one inside.
+pub(super) struct Shell {
+    inner: Ball,
+    outer: Ball,
+}
+
+impl Holds for Shell {
+    #[inline(always)]
+    fn span(&self, origin: [f64; 3], direction: [f64; 3]) -> (f64, f64) {
+        let (start, end) = self.outer.within(origin, direction);
+        // What goes into the inner sphere has met the surface before.
+        let (near, far) = self.inner.within(origin, direction);
+        let enters = (near > 0.0) & (near <= far) & (start <= end);
+        ahead((start, if enters { near } else { end }))
+    }
+}
+
+/// Between two levels.
+pub(super) struct Slab {
+    low: f64,
+    high: f64,
+}
+
+impl Holds for Slab {
+    #[inline(always)]
+    fn span(&self, [_, _, z]: [f64; 3], [_, _, dz]: [f64; 3]) -> (f64, f64) {
+        let room = ROOM * (self.low.abs() + self.high.abs() + z.abs());
+        ahead(between(self.low - room, self.high + room, z, dz))
+    }
+}
+
+/// A box.
+pub(super) struct Block {
+    min: [f64; 3],
+    max: [f64; 3],
+}
+
+impl Holds for Block {
+    #[inline(always)]
+    fn span(&self, origin: [f64; 3], direction: [f64; 3]) -> (f64, f64) {
+        let mut span = (f64::NEG_INFINITY, f64::INFINITY);
+        for axis in 0..3 {
+            let (min, max, at) = (self.min[axis], self.max[axis], origin[axis]);
+            let room = (min.abs() + max.abs() + at.abs()) * ROOM;
+            let (near, far) = between(min - room, max + room, at, direction[axis]);
+            span = (
+                if near > span.0 { near } else { span.0 },
+                if far < span.1 { far } else { span.1 },
+            );
+        }
+        ahead(span)
+    }
+}
+
+/// Between two parallel planes.
+#[inline(always)]
+fn between(low: f64, high: f64, origin: f64, direction: f64) -> (f64, f64) {
+    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
+    let rises = a < b;
+    let (near, far) = (if rises { a } else { b }, if rises { b } else { a });
+    let is_inside = (origin >= low) & (origin <= high);
+    let (always, never) = (
+        if is_inside { f64::NEG_INFINITY } else { NONE.0 },
+        if is_inside { f64::INFINITY } else { NONE.1 },
+    );
+    let stays = direction == 0.0;
+    (
+        if stays { always } else { near },
+        if stays { never } else { far },
+    )
 }
 
 /// Whether a bound cuts the surface off, and not only holds it.
@@ -60,39 +193,6 @@ pub(crate) fn contains(bound: &Bound, place: DVec3) -> bool {
             (0..3).all(|axis| place[axis] >= min[axis] && place[axis] <= max[axis])
         }
     }
-}
-
-/// Inside a sphere about the origin, without losing an eye close above a planet to rounding.
-fn sphere(radius: f64, origin: DVec3, direction: DVec3) -> Option<(f64, f64)> {
-    let towards = -origin.dot(direction);
-    let distance = origin.dot(origin).sqrt();
-    let power = (distance - radius) * (distance + radius);
-    let discriminant = towards * towards - power;
-    if discriminant < 0.0 {
-        return None;
-    }
-    let root = discriminant.sqrt();
-    // The root of larger size first: the other follows without cancellation.
-    let large = if towards >= 0.0 {
-        towards + root
-    } else {
-        towards - root
-    };
-    let other = if large == 0.0 { 0.0 } else { power / large };
-    Some(if large >= other {
-        (other, large)
-    } else {
-        (large, other)
-    })
-}
-
-/// Between two parallel planes.
-fn slab(low: f64, high: f64, origin: f64, direction: f64) -> Option<(f64, f64)> {
-    if direction == 0.0 {
-        return (origin >= low && origin <= high).then_some((f64::NEG_INFINITY, f64::INFINITY));
-    }
-    let (a, b) = ((low - origin) / direction, (high - origin) / direction);
-    Some(if a < b { (a, b) } else { (b, a) })
 }
 
 #[cfg(test)]

@@ -81,7 +81,8 @@ impl Surface {
     /// Whether means say anything of this surface.
     pub(crate) fn knows(&self, means: Means) -> bool {
         let is_used = |technique: Technique| technique.is_used(self.without);
-        let looks_ahead = self.clearances.have_errors() && self.program.looks_ahead();
+        let is_bounded = self.program.looks_ahead() || self.program.walks();
+        let looks_ahead = self.clearances.have_errors() && is_bounded;
         match means {
             Means::Values | Means::Ranges(_) => true,
             Means::Tangents => self.clearances.have_tangents() && is_used(Technique::Tangents),

@@ -10,6 +10,7 @@ pub(crate) mod bracket;
 pub(crate) mod bundle;
 mod choice;
 mod clearance;
+pub(crate) mod clip;
 mod coarse;
 pub(crate) mod grid;
 pub(crate) mod ground;
@@ -23,6 +24,7 @@ pub(crate) mod split;
 pub(crate) mod surface;
 pub(crate) mod techniques;
 pub(crate) mod tracer;
+pub(crate) mod walk;
 
 pub use means::{Arithmetic, Means};
 pub(crate) use surface::Surface;

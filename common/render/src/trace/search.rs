@@ -230,7 +230,8 @@ impl Search {
             (rows.error[i], rows.slope_error[i]) = clearance.errors;
             rows.reach[i] = clearance.reach;
         }
-        if surface.means == Means::Stretches {
+        let means = surface.steps_by();
+        if means == Means::Stretches {
             rows.look(n, looks.bends);
             let outlook = [
                 &rows.error,
@@ -246,7 +247,7 @@ impl Search {
             };
             let seen = [&mut rows.seen, &mut rows.looked_back, &mut rows.bend];
             batch.evaluate_ahead(surface, n, paths, (sides, outlook), seen, scratch);
-        } else if surface.means == Means::Tangents {
+        } else if means == Means::Tangents {
             batch.evaluate_along(surface, n, paths, scratch);
         } else {
             batch.evaluate(surface, n, paths, scratch);
@@ -257,7 +258,7 @@ impl Search {
             let pick = clearance.pick(batch.value[i]);
             (rows.offset[i], rows.slope[i]) = (pick.offset, pick.slope);
             let tangent = &clearance.tangent;
-            rows.tangent_offset[i] = if surface.means != Means::Values {
+            rows.tangent_offset[i] = if means != Means::Values {
                 tangent.offset
             } else {
                 f64::INFINITY

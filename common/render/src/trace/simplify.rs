@@ -48,7 +48,8 @@ pub(crate) fn for_rays(surface: &Surface, rays: &[Ray]) -> Option<Surface> {
 
 /// Whether a program can be searched by the same means.
 fn fits(surface: &Surface, program: &Program) -> bool {
-    program.looks_ahead() || !surface.program.looks_ahead()
+    let is_searched = |program: &Program| program.looks_ahead() || program.walks();
+    is_searched(program) || !is_searched(&surface.program)
 }
 
 /// Cells that hold every place of the rays where the surface can be; `None` where rays are too far apart, or none meets the bound.

@@ -184,9 +184,18 @@ impl Surface {
         self.cost < 1.0
     }
 
-    /// Whether single rays walk as far as they are outside in one step.
+    /// Whether rays are walked to their roots.
     pub(crate) fn walks(&self) -> bool {
         self.means == Means::Stretches && self.program.walks()
+    }
+
+    /// By what means single rays step: those that are walked go no farther by themselves than values say.
+    pub(crate) fn steps_by(&self) -> Means {
+        if self.walks() {
+            Means::Values
+        } else {
+            self.means
+        }
     }
 
     /// The camera ray of a sight.

@@ -5,8 +5,8 @@ use core::sync::atomic::{AtomicBool, Ordering};
 use field::Scratch;
 use glam::DVec3;
 
-use super::bound;
 use super::bundle::{Bundles, Span};
+use super::clip::Clips;
 use super::grid::Grid;
 use super::ground;
 use super::means::Means;
@@ -16,6 +16,7 @@ use super::search::{Pause, Search};
 use super::simplify;
 use super::surface::Surface;
 use super::techniques::Technique;
+use super::walk::Walks;
 use crate::counts::Counts;
 use crate::error::Cancelled;
 use crate::times::{Part, Stopwatch};
@@ -92,9 +93,11 @@ pub(crate) struct Results<'a> {
 /// Memory in which rays are traced; one per thread.
 #[derive(Default)]
 pub(crate) struct Tracer {
+    clips: Box<Clips>,
     spans: Vec<Span>,
     paused: Vec<Span>,
     bundles: Bundles,
+    walks: Walks,
     search: Search,
     ranges: Ranges,
     polish: Polish,
@@ -172,9 +175,11 @@ impl Tracer {
             Goal::Occlusion => Part::Shadows,
         };
         let Self {
+            clips,
             spans,
             paused,
             bundles,
+            walks,
             search,
             ranges,
             polish,
@@ -182,19 +187,9 @@ impl Tracer {
             stopwatch,
         } = self;
         stopwatch.begin(part(Part::Bundles));
-        spans.clear();
-        spans.extend(rays.iter().enumerate().filter_map(|(index, ray)| {
-            let (clear, end) = bound::clip(&surface.bound, ray.origin, ray.direction)?;
-            Some(Span {
-                ray: index,
-                clear,
-                end,
-                steps: 0.0,
-            })
-        }));
+        clips.clip(surface.level, &surface.bound, rays, spans);
         let ground = surface.ground.as_ref().filter(|_| !surface.walks());
         if ground.is_none() && Technique::Bundles.is_used(surface.without) && !surface.walks() {
-            // Rays that walk to their ends by themselves gain nothing by going together.
             bundles.approach(surface, rays, spans, scratch, counts);
         }
         let polished = Wanted {
@@ -202,7 +197,14 @@ impl Tracer {
             ..wanted
         };
         let goes_back = ground.is_some() && Technique::Rounds.is_used(surface.without);
-        let mut after = if goes_back { ROUND } else { f64::INFINITY };
+        let mut after = if surface.walks() {
+            // Where a walk ends there is a root, but for few.
+            1.0
+        } else if goes_back {
+            ROUND
+        } else {
+            f64::INFINITY
+        };
         // Close to the surface, where rays towards the sun begin, cells of the ground say nothing.
         let mut is_near = goal == Goal::Occlusion;
         // Bundles end near the surface; rays that come far from it again follow the coarse one.
@@ -218,6 +220,9 @@ impl Tracer {
                 ground.lead(bounds, rays, spans, wanted.cancel)?;
             }
             stopwatch.begin(part(Part::Search));
+            if surface.walks() {
+                walks.lead(surface, rays, spans, scratch, counts);
+            }
             let mut found = |found: Found, results: Results<'_>| {
                 let found = if surface.is_partial {
                     found.without_outside()

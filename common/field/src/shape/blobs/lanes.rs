@@ -127,7 +127,7 @@ fn hull<R: Rows>(first: usize, part: &R) -> Interval {
 
 /// The least interval from the least of some numbers to the greatest of others.
 #[inline(always)]
-pub(super) fn hull_of(low: &[f64; WIDTH], high: &[f64; WIDTH]) -> Interval {
+fn hull_of(low: &[f64; WIDTH], high: &[f64; WIDTH]) -> Interval {
     let [mut low, mut high] = [*low, *high];
     // By halves: a chain of comparisons would wait for every one.
     for width in [8, 4, 2, 1] {

@@ -1,6 +1,6 @@
 //! Blobs at many places together against one place at a time, and rays walked to their roots.
 
-use super::{Blobs, Walk};
+use super::{Blobs, Met, Walk};
 use crate::hash::{hash, unit};
 use crate::number::Dual;
 use crate::points::BATCH;
@@ -99,17 +99,16 @@ fn walked(kernel: u32, weights: [f64; 2]) -> Vec<(f64, f64)> {
         lanes(&|i| 2.0 * number(i, 21)),
     );
     let (z, zero, down) = ([4.0; BATCH], [0.0; BATCH], [-1.0; BATCH]);
-    let value = std::array::from_fn(|i| blobs.value([x[i], y[i], z[i]]));
     let walk = Walk {
         place: [&x, &y, &z],
         direction: [&zero, &zero, &down],
         world: [&x, &y, &z],
-        value: &value,
         offset: &[1e-12; BATCH],
         limit: &[8.0; BATCH],
     };
-    let mut ahead = [1.0; BATCH];
-    dispatch!(SimdLevel::best(), simd => blobs.walk(simd, walk, &mut ahead));
+    let mut ahead = [0.0; BATCH];
+    let met = &mut Met::default();
+    dispatch!(SimdLevel::best(), simd => blobs.walk(simd, walk, met, &mut ahead));
     let end = |i: usize| (ahead[i], blobs.value([x[i], y[i], 4.0 - ahead[i]]));
     (0..BATCH).map(end).collect()
 }
@@ -117,11 +116,16 @@ fn walked(kernel: u32, weights: [f64; 2]) -> Vec<(f64, f64)> {
 #[test]
 fn one_walk_ends_at_the_root_or_at_the_limit() {
     let ends = walked(3, [1.0, 1.0]);
-    let misses = ends.iter().filter(|(ahead, _)| *ahead > 7.999).count();
-    let roots = ends.iter().filter(|(ahead, f)| *ahead < 7.9 && *f < 1e-6);
-    let roots = roots.count();
+    let is_miss = |(ahead, _): &(f64, f64)| *ahead > 7.999;
+    let is_root = |(ahead, f): &(f64, f64)| *ahead < 7.9 && *f < 1e-5;
+    let misses = ends.iter().filter(|end| is_miss(end)).count();
+    let roots = ends.iter().filter(|end| is_root(end)).count();
     assert!(misses > 10 && roots > 40, "{misses} {roots}");
-    assert_eq!(misses + roots, BATCH, "every ray needs one walk");
+    let others: Vec<_> = ends
+        .iter()
+        .filter(|end| !is_miss(end) && !is_root(end))
+        .collect();
+    assert!(others.is_empty(), "every ray needs one walk: {others:?}");
 }
 
 #[test]

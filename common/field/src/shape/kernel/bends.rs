@@ -7,6 +7,12 @@ use crate::interval::Interval;
 const ROOM: f64 = 1e-9;
 
 impl Kernel {
+    /// Whether it is (1 − u)².
+    #[inline(always)]
+    pub(crate) fn is_parabola(self) -> bool {
+        matches!(self, Self::Murakami)
+    }
+
     /// Whether it lies above its tangents as a function of u.
     #[inline(always)]
     pub(crate) fn is_convex(self) -> bool {
