@@ -69,7 +69,7 @@ fn distances_along_lines_are_held_by_forms_as_narrow_as_they_can_be() {
         let Some(near) = Near::new(&at, 2, 343) else {
             panic!("{at:?} is near");
         };
-        let cap = REACH.powf(exponent);
+        let cap = libm::pow(REACH, exponent);
         let mut sorted = [Reduced::<1>::point(cap); ORDERS];
         Arithmetic::nearest(&cellular, &near, &mut sorted);
         let mut beside = [Interval::new(f64::INFINITY, f64::NEG_INFINITY); ORDERS];
@@ -78,7 +78,7 @@ fn distances_along_lines_are_held_by_forms_as_narrow_as_they_can_be() {
             let e = f64::from(sample) / f64::from(SAMPLES);
             let place = [0, 1, 2].map(|k| middle[k] + e * along[k]);
             for (order, distance) in nearest(&cellular, place).into_iter().enumerate() {
-                let value = distance.powf(exponent);
+                let value = libm::pow(distance, exponent);
                 let form = &sorted[order];
                 assert!(
                     holds(form, [e], value),
