@@ -148,23 +148,22 @@ impl Near {
 /// The least number of a row, those left out that are none.
 #[inline(always)]
 pub(super) fn least_of(row: &Row) -> f64 {
-    let mut row = *row;
-    // By halves: a chain of comparisons would wait for every one.
-    for width in HALVES {
-        for lane in 0..width {
-            row[lane] = least(row[lane + width], row[lane]);
-        }
-    }
-    row[0]
+    by_halves(row, least)
 }
 
 /// The greatest number of a row, those left out that are none.
 #[inline(always)]
 pub(super) fn most_of(row: &Row) -> f64 {
+    by_halves(row, most)
+}
+
+/// One number of a row, as `chosen` between two at a time: a chain of comparisons would wait for every one.
+#[inline(always)]
+fn by_halves(row: &Row, chosen: impl Fn(f64, f64) -> f64) -> f64 {
     let mut row = *row;
     for width in HALVES {
         for lane in 0..width {
-            row[lane] = most(row[lane + width], row[lane]);
+            row[lane] = chosen(row[lane + width], row[lane]);
         }
     }
     row[0]

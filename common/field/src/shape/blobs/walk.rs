@@ -33,7 +33,7 @@ const CLIPS: [u32; 2] = [3, 8];
 const SHORT: f64 = 1.0 / 8.0;
 
 /// A piece of which less than this share is clear begins at the root.
-const ROOT: f64 = 1e-5;
+const ROOT: f64 = 1e-6;
 
 /// Pieces that are shorter than this share of the first are not tried.
 const SHORTEST: f64 = 1.0 / 64.0;
