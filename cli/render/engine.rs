@@ -29,6 +29,10 @@ use crate::stop::Stop;
 /// How often whoever watches is told about progress.
 const REPORT_INTERVAL: Duration = Duration::from_millis(100);
 
+/// The last blocks are cut into so many parts of what a thread works on together: smaller ones take longer for a pixel, but all
+/// threads end at about the same time.
+const LAST_PARTS: u64 = 8;
+
 /// What to render, and how.
 pub(crate) struct Plan<'a> {
     /// The scene.
@@ -301,7 +305,7 @@ impl Shared<'_> {
         let blocks = in_tiles(remaining, film.window, plan.tile);
         self.blocks
             .fetch_add(blocks.len() as u64, Ordering::Relaxed);
-        let least = renderer.together();
+        let least = (renderer.together() / LAST_PARTS).max(1);
         let work = Work {
             image,
             renderer,

@@ -33,3 +33,24 @@ pub(crate) fn in_order<T: Sync, R: Send + Sync>(
         .filter_map(OnceLock::into_inner)
         .collect()
 }
+
+/// What two independent pieces of work make.
+pub(crate) fn both<A: Send + Sync, B: Send + Sync>(
+    crew: &dyn Crew,
+    first: impl Fn() -> A + Sync,
+    second: impl Fn() -> B + Sync,
+) -> (A, B) {
+    let (made_first, made_second) = (OnceLock::new(), OnceLock::new());
+    crew.each(2, &|index| {
+        if index == 0 {
+            made_first.get_or_init(&first);
+        } else {
+            made_second.get_or_init(&second);
+        }
+    });
+    // A crew does every piece; one that did not leaves it to this thread.
+    (
+        made_first.into_inner().unwrap_or_else(first),
+        made_second.into_inner().unwrap_or_else(second),
+    )
+}

@@ -10,7 +10,7 @@ use scene::Description;
 
 use crate::assets::Assets;
 use crate::counts::Counts;
-use crate::crew::{Alone, Crew};
+use crate::crew::{Alone, Crew, both};
 use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
 use crate::grids;
@@ -23,6 +23,7 @@ use crate::shade::light::{Lit, Lits};
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
 use crate::times::{Clock, Part, Stopwatch, Times};
+use crate::trace::surface::vertical;
 use crate::trace::{Goal, Hit, Means, Ray, Surface, Technique, Tracer};
 use crate::view::{Rows, Sight, View};
 
@@ -131,10 +132,15 @@ impl ImageRenderer {
         let start = f64::from(image.0) / film.fps;
         let view = View::new(&description.camera, film, start);
         let (start, end) = view.instants();
-        let surface = Surface::prepared(crew, description, &view, settings, technique)?;
-        let palette = Palette::new(description, assets, Interval::new(start, end))?;
-        let up = surface.vertical(view.eye());
+        let up = vertical(description.surface.seed, view.eye());
         let ground = mean_albedo(&description.surface.material);
+        let (surface, sky) = both(
+            crew,
+            || Surface::prepared(crew, description, &view, settings, technique),
+            || Sky::new(description, start, up, ground, crew),
+        );
+        let surface = surface?;
+        let palette = Palette::new(description, assets, Interval::new(start, end))?;
         Ok(Self {
             strata: Strata::new(rays, order, description.key, image.0),
             // Where nothing moves, all instants are one.
@@ -145,7 +151,7 @@ impl ImageRenderer {
             } else {
                 1
             },
-            sky: Sky::new(description, start, up, ground, crew),
+            sky,
             clouds: Clouds::new(description, view.eye(), Interval::new(start, end))?,
             view,
             surface,
@@ -161,7 +167,7 @@ impl ImageRenderer {
     }
 
     /// Most pixels that are worked on together. A larger block is cut into [halves](Rect::halves), and these again, until none
-    /// is larger: such parts may as well be rendered as blocks of their own, by the same work.
+    /// is larger: such parts may as well be rendered as blocks of their own, by the same work. Smaller ones take longer for a pixel.
     pub fn together(&self) -> u64 {
         (TOGETHER / self.strata.per_pixel()).max(1) as u64
     }

@@ -4,11 +4,12 @@
 //! where it is seen from. So some rays of the image are traced by each, and their steps counted
 //! ([`super::choice`]).
 
-use core::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::OnceLock;
+use core::sync::atomic::AtomicBool;
+use std::sync::{Arc, OnceLock};
 
 use field::{Interval, Segment};
 
+use super::allowance::{Allowance, Least};
 use super::surface::Surface;
 use super::tracer::{Goal, Ray, Tracer};
 use crate::counts::Counts;
@@ -204,23 +205,18 @@ impl<'a> Trial<'a> {
             let total = costs.iter().map(|cost| cost.get().copied());
             Some(total.sum::<Option<f64>>()? / rays.len() as f64)
         };
-        // The bits of numbers that are not negative are in the numbers' order.
-        let least = AtomicU64::new(limit.to_bits());
-        let evaluations: Vec<_> = surfaces.iter().map(|_| AtomicU64::new(0)).collect();
+        let least = Arc::new(Least::new(limit));
+        let allow = |surface: &Surface| Surface {
+            steps_max,
+            allowance: Some(Arc::new(Allowance::new(rays.len(), &least))),
+            ..surface.clone()
+        };
+        let allowed: Vec<Surface> = surfaces.iter().map(allow).collect();
         self.crew.each(costs.len(), &|index| {
             let (surface, piece) = (index / pieces.len(), index % pieces.len());
-            let limit = f64::from_bits(least.load(Ordering::Relaxed)) * rays.len() as f64;
-            let rays = pieces[piece];
-            let cost = cost(
-                &surfaces[surface],
-                rays,
-                steps_max,
-                limit,
-                &evaluations[surface],
-            );
-            costs[index].get_or_init(|| cost);
+            costs[index].get_or_init(|| cost(&allowed[surface], pieces[piece]));
             if let Some(total) = total(surface) {
-                least.fetch_min(total.to_bits(), Ordering::Relaxed);
+                least.hear(total);
             }
         });
         (0..surfaces.len())
@@ -229,37 +225,18 @@ impl<'a> Trial<'a> {
     }
 }
 
-/// What rays cost, in evaluations of a value; infinitely much if the surface's `evaluations`, to which those of these rays are
-/// added, are found to be more than `limit` before the end.
-fn cost(
-    surface: &Surface,
-    rays: &[Ray],
-    steps_max: f64,
-    limit: f64,
-    evaluations: &AtomicU64,
-) -> f64 {
-    #[expect(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "the cast saturates"
-    )]
-    let most = limit as u64;
-    let surface = Surface {
-        steps_max,
-        evaluations_max: most.saturating_sub(evaluations.load(Ordering::Relaxed)),
-        ..surface.clone()
-    };
+/// What rays cost, in evaluations of a value; infinitely much where the surface allows less.
+fn cost(surface: &Surface, rays: &[Ray]) -> f64 {
     let (mut counts, mut hits) = (Counts::default(), Vec::new());
     let never = AtomicBool::new(false);
     let goal = Goal::Distance;
     let mut tracer = Tracer::default();
-    let done = tracer.trace(&surface, goal, rays, &never, &mut counts, &mut hits);
-    evaluations.fetch_add(counts.evaluations, Ordering::Relaxed);
+    let done = tracer.trace(surface, goal, rays, &never, &mut counts, &mut hits);
     if done.is_err() {
         return f64::INFINITY;
     }
     let steps = counts.steps as f64;
-    let step_cost = surface.means.cost_for(&surface);
+    let step_cost = surface.means.cost_for(surface);
     let values = (counts.evaluations as f64 - steps) + steps * step_cost;
     let spared = surface.coarse.as_ref().map_or(0.0, |coarse| {
         let [together, alone] = tracer.coarse_evaluations();

@@ -4,6 +4,7 @@
 //! distance is then polished between that point and the one before. How the search
 //! gets there ([`tracer`]) decides only what need not be looked at.
 
+mod allowance;
 pub(crate) mod batch;
 pub(crate) mod bound;
 pub(crate) mod bracket;

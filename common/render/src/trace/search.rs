@@ -96,7 +96,7 @@ impl Search {
             if n == 0 {
                 return Ok(());
             }
-            if cancel.load(Ordering::Relaxed) || counts.evaluations > surface.evaluations_max {
+            if cancel.load(Ordering::Relaxed) || surface.spend(n as u64).is_err() {
                 self.rays.clear();
                 return Err(Cancelled);
             }

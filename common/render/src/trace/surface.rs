@@ -7,6 +7,7 @@ use glam::DVec3;
 use scene::Description;
 use scene::description::{Bound, Seed};
 
+use super::allowance::Allowance;
 use super::clearance::{Around, Clearances};
 use super::coarse;
 use super::grid::Grid;
@@ -19,7 +20,7 @@ use super::tracer::Ray;
 #[cfg(test)]
 use crate::crew::Alone;
 use crate::crew::Crew;
-use crate::error::RenderError;
+use crate::error::{Cancelled, RenderError};
 use crate::renderer::EvalSettings;
 use crate::view::{Footprint, Sight, View};
 
@@ -63,8 +64,8 @@ pub(crate) struct Surface {
     pub(crate) looks: Looks,
     /// Most evaluations along one ray.
     pub(crate) steps_max: f64,
-    /// Most evaluations along all rays together: whoever needs more is told that it was cancelled.
-    pub(crate) evaluations_max: u64,
+    /// What its rays may cost, where that is limited.
+    pub(crate) allowance: Option<Arc<Allowance>>,
     /// Whether its program has been simplified, so that values outside are not those of the field.
     pub(crate) is_partial: bool,
     /// A technique that is left out.
@@ -164,7 +165,7 @@ impl Surface {
             means: Means::Values,
             looks: Looks::default(),
             steps_max: STEPS_MAX,
-            evaluations_max: u64::MAX,
+            allowance: None,
             is_partial: false,
             without,
             program: program.clone(),
@@ -198,6 +199,14 @@ impl Surface {
         }
     }
 
+    /// Takes evaluations from what its rays may cost.
+    pub(crate) fn spend(&self, evaluations: u64) -> Result<(), Cancelled> {
+        match &self.allowance {
+            Some(allowance) => allowance.spend(evaluations),
+            None => Ok(()),
+        }
+    }
+
     /// The camera ray of a sight.
     pub(crate) fn ray(&self, sight: &Sight) -> Ray {
         Ray {
@@ -221,17 +230,7 @@ impl Surface {
 
     /// What heights are measured along, at a place; a unit vector.
     pub(crate) fn vertical(&self, place: DVec3) -> DVec3 {
-        match self.seed {
-            Seed::Plane => DVec3::Z,
-            Seed::Sphere { .. } => {
-                let square = place.dot(place);
-                if square > 0.0 {
-                    place * (1.0 / square.sqrt())
-                } else {
-                    DVec3::Z
-                }
-            }
-        }
+        vertical(self.seed, place)
     }
 
     /// The height of a place over the seed, metres.
@@ -239,6 +238,21 @@ impl Surface {
         match self.seed {
             Seed::Plane => place.z,
             Seed::Sphere { radius } => place.dot(place).sqrt() - radius,
+        }
+    }
+}
+
+/// What heights over a seed are measured along, at a place; a unit vector.
+pub(crate) fn vertical(seed: Seed, place: DVec3) -> DVec3 {
+    match seed {
+        Seed::Plane => DVec3::Z,
+        Seed::Sphere { .. } => {
+            let square = place.dot(place);
+            if square > 0.0 {
+                place * (1.0 / square.sqrt())
+            } else {
+                DVec3::Z
+            }
         }
     }
 }

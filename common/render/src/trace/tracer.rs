@@ -190,7 +190,9 @@ impl Tracer {
         clips.clip(surface.level, &surface.bound, rays, spans);
         let ground = surface.ground.as_ref().filter(|_| !surface.walks());
         if ground.is_none() && Technique::Bundles.is_used(surface.without) && !surface.walks() {
+            let before = counts.evaluations;
             bundles.approach(surface, rays, spans, scratch, counts);
+            surface.spend(counts.evaluations - before)?;
         }
         let polished = Wanted {
             surface: whole,
