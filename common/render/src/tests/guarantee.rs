@@ -10,7 +10,7 @@ use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
-use crate::trace::bundle::Span;
+use crate::trace::bundle::{Bundles, Span};
 use crate::trace::ground::{Bounds, Ground, Site};
 use crate::trace::means::{self, Means};
 use crate::trace::methods::tests::reference::truth;
@@ -314,27 +314,32 @@ fn rays_from_the_surface_are_found_to_be_in_shadow_by_the_scan_too() {
     }
 }
 
+/// Sixteen patches of some pixels, each a bundle at the start and four at the end.
+fn patches(surface: &Surface, view: &View, [width, height]: [u32; 2]) -> Vec<Ray> {
+    let random = |ray: u32, dimension: u32| unit(hash(&[ray, dimension, 7]));
+    (0..1024)
+        .map(|index| {
+            let patch = index / 64;
+            let place = [0, 1].map(|axis| {
+                let side = [width, height];
+                let corner = f64::from(side[axis as usize]) * random(patch, 10 + axis);
+                let cell = f64::from((index >> (4 + axis)) & 1) + random(index, axis);
+                corner + 1.5 * cell
+            });
+            let instant = random(index, 2);
+            let sight = view.sight(&Sample { place, instant });
+            surface.ray(&sight)
+        })
+        .collect()
+}
+
 #[test]
 fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
     for (name, scene) in scenes::all() {
         let view = View::new(&scene.camera, &scene.film, 0.0);
         let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
-        let random = |ray: u32, dimension: u32| unit(hash(&[ray, dimension, 7]));
-        // Sixteen patches of some pixels, each a bundle at the start and four at the end.
-        let rays: Vec<Ray> = (0..1024)
-            .map(|index| {
-                let patch = index / 64;
-                let place = [0, 1].map(|axis| {
-                    let side = [scene.film.resolution.width, scene.film.resolution.height];
-                    let corner = f64::from(side[axis as usize]) * random(patch, 10 + axis);
-                    let cell = f64::from((index >> (4 + axis)) & 1) + random(index, axis);
-                    corner + 1.5 * cell
-                });
-                let instant = random(index, 2);
-                let sight = view.sight(&Sample { place, instant });
-                surface.ray(&sight)
-            })
-            .collect();
+        let size = scene.film.resolution;
+        let rays = patches(&surface, &view, [size.width, size.height]);
         let (hits, counts) = trace(&surface, Goal::Distance, &rays);
         assert!(
             counts.cone_steps > 0 || surface.walks() || surface.ground.is_some(),
@@ -346,6 +351,71 @@ fn what_a_ray_shares_with_its_neighbours_cannot_be_seen() {
         }
         assert!(hits.iter().any(|hit| *hit != Hit::None), "{name}");
     }
+}
+
+#[test]
+fn where_bundles_lead_their_rays_the_field_is_positive() {
+    let mut gains = 0;
+    for (name, scene) in scenes::all()
+        .into_iter()
+        .chain([("layers", scenes::layers()), ("goursat", scenes::goursat())])
+    {
+        let view = View::new(&scene.camera, &scene.film, 0.0);
+        let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
+        let size = scene.film.resolution;
+        let rays = patches(&surface, &view, [size.width, size.height]);
+        let mut spans = Vec::new();
+        for (
+            ray,
+            Ray {
+                origin, direction, ..
+            },
+        ) in rays.iter().enumerate()
+        {
+            if let Some((clear, end)) = bound::clip(&surface.bound, *origin, *direction) {
+                let steps = 0.0;
+                spans.push(Span {
+                    ray,
+                    clear,
+                    end,
+                    steps,
+                });
+            }
+        }
+        let mut scratch = Scratch::new();
+        let mut led = |gradients: bool| {
+            let surface = Surface {
+                gradients,
+                ..surface.clone()
+            };
+            let mut led = spans.clone();
+            let counts = &mut Counts::default();
+            Bundles::default().approach(&surface, &rays, &mut led, &mut scratch, counts);
+            let mut sum = 0.0;
+            for (from, to) in spans.iter().zip(&led) {
+                let way = to.clear.min(to.end) - from.clear;
+                assert!(way >= 0.0, "{name}: {way}");
+                sum += way;
+                let distances: Vec<f64> = (0..=200)
+                    .map(|i| from.clear + way * f64::from(i) / 200.0)
+                    .collect();
+                let mut values = Values {
+                    surface: &surface,
+                    ray: &rays[from.ray],
+                    scratch: &mut scratch,
+                };
+                let (values, _) = values.at(&distances);
+                let is_clear = values.iter().all(|value| *value > 0.0);
+                assert!(way == 0.0 || is_clear, "{name}: {from:?} to {to:?}");
+            }
+            sum
+        };
+        let by_values = led(false);
+        if surface.clearances.have_tangents() {
+            gains += u32::from(led(true) > by_values);
+        }
+    }
+    assert!(gains > 2, "of {gains} scenes only");
 }
 
 #[test]

@@ -193,10 +193,11 @@ fn a_clock_changes_neither_pixels_nor_counts() {
 fn no_technique_of_the_tracer_changes_a_pixel() {
     for technique in Technique::ALL {
         let mut is_of_use = false;
-        for (name, scene) in scenes::all()
-            .into_iter()
-            .chain([("crags", scenes::crags()), ("layers", scenes::layers())])
-        {
+        for (name, scene) in scenes::all().into_iter().chain([
+            ("crags", scenes::crags()),
+            ("layers", scenes::layers()),
+            ("goursat", scenes::goursat()),
+        ]) {
             let settings = EvalSettings::default();
             let (reference, counts) = image(&scene, settings);
             let without = ImageRenderer::without(

@@ -152,6 +152,23 @@ pub(super) fn sphere() -> Description {
     scene
 }
 
+/// Goursat's rounded cube x⁴ + y⁴ + z⁴ = 1, whose field is steep far from it and flat inside.
+pub(super) fn goursat() -> Description {
+    let mut fields = Fields::new();
+    let p = fields.position();
+    let fourth = [Op::X, Op::Y, Op::Z].map(|axis| {
+        let part = fields.op(axis, &[p], &[]);
+        let square = fields.op(Op::Mul, &[part, part], &[]);
+        fields.op(Op::Mul, &[square, square], &[])
+    });
+    let [x, y, z] = fourth;
+    let two = fields.op(Op::Add, &[x, y], &[]);
+    let three = fields.op(Op::Add, &[two, z], &[]);
+    let one = fields.number(1.0);
+    let field = fields.op(Op::Sub, &[three, one], &[]);
+    orthographic(fields.0, field, 1.5)
+}
+
 /// The plane z = 0, seen from a height of 2 m in a level view.
 pub(super) fn plane() -> Description {
     let mut fields = Fields::new();

@@ -28,6 +28,8 @@ pub(crate) struct Batch {
     pub(crate) value: Lanes,
     /// The value's derivative along the ray.
     pub(crate) slope: Lanes,
+    /// The value's gradient, where that is evaluated.
+    pub(crate) gradient: [Lanes; 3],
     /// How many evaluations were of coarse surfaces.
     pub(crate) coarse_evaluations: u64,
 }
@@ -52,6 +54,7 @@ impl Default for Batch {
             footprint: [0.0; BATCH],
             value: [0.0; BATCH],
             slope: [0.0; BATCH],
+            gradient: [[0.0; BATCH]; 3],
             coarse_evaluations: 0,
         }
     }
@@ -90,6 +93,22 @@ impl Paths {
     }
 }
 
+/// The first `n` places.
+fn points<'a>(
+    n: usize,
+    [x, y, z]: &'a [Lanes; 3],
+    footprint: &'a Lanes,
+    paths: &'a Paths,
+) -> Points<'a> {
+    Points {
+        x: &x[..n],
+        y: &y[..n],
+        z: &z[..n],
+        footprint: &footprint[..n],
+        time: &paths.time[..n],
+    }
+}
+
 impl Batch {
     /// The places at distances `t` along the first `n` paths.
     #[inline(always)]
@@ -116,17 +135,6 @@ impl Batch {
         }
     }
 
-    fn points<'a>(&'a self, n: usize, paths: &'a Paths) -> Points<'a> {
-        let [x, y, z] = &self.place;
-        Points {
-            x: &x[..n],
-            y: &y[..n],
-            z: &z[..n],
-            footprint: &self.footprint[..n],
-            time: &paths.time[..n],
-        }
-    }
-
     /// Evaluates the field at the places.
     pub(crate) fn evaluate(
         &mut self,
@@ -135,14 +143,12 @@ impl Batch {
         paths: &Paths,
         scratch: &mut Scratch,
     ) {
-        let mut value = [0.0; BATCH];
         surface.program.evaluate(
             surface.level,
-            &self.points(n, paths),
+            &points(n, &self.place, &self.footprint, paths),
             scratch,
-            &mut [&mut value[..n]],
+            &mut [&mut self.value[..n]],
         );
-        self.value[..n].copy_from_slice(&value[..n]);
         if surface.is_coarse() {
             self.coarse_evaluations += n as u64;
             for i in 0..n {
@@ -165,17 +171,32 @@ impl Batch {
         paths: &Paths,
         scratch: &mut Scratch,
     ) {
-        let (mut value, mut slope) = ([0.0; BATCH], [0.0; BATCH]);
         let [x, y, z] = &paths.direction;
         surface.program.evaluate_along(
             surface.level,
-            &self.points(n, paths),
+            &points(n, &self.place, &self.footprint, paths),
             [&x[..n], &y[..n], &z[..n]],
             scratch,
-            [&mut value[..n], &mut slope[..n]],
+            [&mut self.value[..n], &mut self.slope[..n]],
         );
-        self.value[..n].copy_from_slice(&value[..n]);
-        self.slope[..n].copy_from_slice(&slope[..n]);
+    }
+
+    /// Evaluates the field at the places, and its gradient.
+    pub(crate) fn evaluate_gradient(
+        &mut self,
+        surface: &Surface,
+        n: usize,
+        paths: &Paths,
+        scratch: &mut Scratch,
+    ) {
+        let [x, y, z] = &mut self.gradient;
+        surface.program.evaluate_gradient(
+            surface.level,
+            &points(n, &self.place, &self.footprint, paths),
+            scratch,
+            &mut self.value[..n],
+            [&mut x[..n], &mut y[..n], &mut z[..n]],
+        );
     }
 
     /// How far along the paths the field of a surface that walks is clear from the places on.
@@ -188,7 +209,7 @@ impl Batch {
         clear: &mut [f64],
         scratch: &mut Scratch,
     ) {
-        let points = self.points(n, paths);
+        let points = points(n, &self.place, &self.footprint, paths);
         let [x, y, z] = &paths.direction;
         let direction = [&x[..n], &y[..n], &z[..n]];
         let program = &surface.program;
@@ -206,7 +227,6 @@ impl Batch {
         [ahead, behind, bend]: [&mut Lanes; 3],
         scratch: &mut Scratch,
     ) {
-        let (mut value, mut derivative) = ([0.0; BATCH], [0.0; BATCH]);
         let [x, y, z] = &paths.direction;
         let outlook = Outlook {
             offset: &offset[..n],
@@ -219,19 +239,17 @@ impl Batch {
         };
         surface.program.evaluate_ahead(
             surface.level,
-            &self.points(n, paths),
+            &points(n, &self.place, &self.footprint, paths),
             [&x[..n], &y[..n], &z[..n]],
             outlook,
             scratch,
             [
-                &mut value[..n],
-                &mut derivative[..n],
+                &mut self.value[..n],
+                &mut self.slope[..n],
                 &mut ahead[..n],
                 &mut behind[..n],
                 &mut bend[..n],
             ],
         );
-        self.value[..n].copy_from_slice(&value[..n]);
-        self.slope[..n].copy_from_slice(&derivative[..n]);
     }
 }

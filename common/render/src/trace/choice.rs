@@ -34,19 +34,15 @@ impl Surface {
             .iter()
             .any(|means| matches!(means, Means::Ranges(_)));
         let ground = ground.filter(|_| !ranges);
-        let bare = Self {
-            means: allowed[0],
-            ..self
-        };
+        let bare = self.by(allowed[0]);
         if given.is_some() && ground.is_none() {
             return bare;
         }
         let trial = Trial::new(&bare, view, crew);
-        let with = |surface: Self, means| Self { means, ..surface };
         let (best, cost) = match ground {
             None => {
                 let (means, cost) = trial.cheapest(&bare, &allowed, f64::INFINITY);
-                (with(bare, means), cost)
+                (bare.by(means), cost)
             }
             Some(ground) => {
                 let led = Self {
@@ -58,12 +54,13 @@ impl Surface {
                 let limit = led_cost + ground::COST;
                 let (means, cost) = trial.cheapest(&bare, &allowed, limit);
                 if cost <= limit {
-                    (with(bare, means), cost)
+                    (bare.by(means), cost)
                 } else {
-                    (with(led, led_means), led_cost)
+                    (led.by(led_means), led_cost)
                 }
             }
         };
+        let (best, cost) = best.bundled(&trial, cost);
         if best.means == Means::Stretches && !best.walks() {
             return best.looking(&trial, cost);
         }
@@ -87,6 +84,40 @@ impl Surface {
             Means::Values | Means::Ranges(_) => true,
             Means::Tangents => self.clearances.have_tangents() && is_used(Technique::Tangents),
             Means::Stretches => looks_ahead && is_used(Technique::Stretches),
+        }
+    }
+
+    /// Traced by these means; bundles by gradients where single rays have derivatives.
+    pub(crate) fn by(&self, means: Means) -> Self {
+        let has_derivatives = matches!(means, Means::Tangents | Means::Stretches);
+        Self {
+            means,
+            gradients: has_derivatives && self.knows_gradients(),
+            ..self.clone()
+        }
+    }
+
+    /// Whether gradients say how far bundles are clear.
+    fn knows_gradients(&self) -> bool {
+        self.clearances.have_tangents() && Technique::Gradients.is_used(self.without)
+    }
+
+    /// With the bundles by which rays need less, those by gradients or those by values; and what a ray then costs.
+    fn bundled(self, trial: &Trial<'_>, cost: f64) -> (Self, f64) {
+        let has_bundles = self.ground.is_none() && !self.walks();
+        let is_tried = has_bundles && Technique::Bundles.is_used(self.without);
+        if !is_tried || !self.knows_gradients() || matches!(self.means, Means::Ranges(_)) {
+            return (self, cost);
+        }
+        let other = Self {
+            gradients: !self.gradients,
+            ..self.clone()
+        };
+        let other_cost = trial.costs(from_ref(&other), cost)[0];
+        if other_cost < cost {
+            (other, other_cost)
+        } else {
+            (self, cost)
         }
     }
 

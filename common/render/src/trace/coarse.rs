@@ -64,6 +64,7 @@ pub(crate) fn with(
         clearances: below,
         cost,
         means: Means::Values,
+        gradients: false,
         ..surface.clone()
     };
     Some(Surface {

@@ -102,6 +102,9 @@ impl Means {
     }
 }
 
+/// What a step of a bundle by gradients costs, beside the evaluation of a value.
+const BUNDLE_STEP: f64 = 2.0;
+
 /// What a step costs that walks to the ray's first root or its end, beside the evaluation of a value.
 const WALK: f64 = 4.0;
 
@@ -151,13 +154,7 @@ impl<'a> Trial<'a> {
         allowed: &[Means],
         limit: f64,
     ) -> (Means, f64) {
-        let tried: Vec<_> = allowed
-            .iter()
-            .map(|&means| Surface {
-                means,
-                ..surface.clone()
-            })
-            .collect();
+        let tried: Vec<_> = allowed.iter().map(|&means| surface.by(means)).collect();
         let costs = self.costs(&tried, limit);
         let mut best = (Means::Values, f64::INFINITY);
         for (&means, cost) in allowed.iter().zip(costs) {
@@ -169,10 +166,7 @@ impl<'a> Trial<'a> {
             let ranges = Means::Ranges(Arithmetic::Reduced);
             let few: Vec<_> = self.rays.iter().copied().step_by(FEW).collect();
             let steps_max = PATIENCE * best.1 / ranges.cost();
-            let tried = Surface {
-                means: ranges,
-                ..surface.clone()
-            };
+            let tried = surface.by(ranges);
             let cost = self.costs_along(&few, &[tried], steps_max, best.1)[0];
             if cost < best.1 {
                 return (ranges, cost);
@@ -237,7 +231,12 @@ fn cost(surface: &Surface, rays: &[Ray]) -> f64 {
     }
     let steps = counts.steps as f64;
     let step_cost = surface.means.cost_for(surface);
-    let values = (counts.evaluations as f64 - steps) + steps * step_cost;
+    let together = if surface.gradients {
+        counts.cone_steps as f64 * (BUNDLE_STEP - 1.0)
+    } else {
+        0.0
+    };
+    let values = (counts.evaluations as f64 - steps) + steps * step_cost + together;
     let spared = surface.coarse.as_ref().map_or(0.0, |coarse| {
         let [together, alone] = tracer.coarse_evaluations();
         together * (1.0 - coarse.cost) + alone * (step_cost - coarse.cost)

@@ -13,6 +13,7 @@ mod choice;
 mod clearance;
 pub(crate) mod clip;
 mod coarse;
+mod cone;
 pub(crate) mod grid;
 pub(crate) mod ground;
 pub(crate) mod means;

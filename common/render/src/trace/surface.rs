@@ -60,6 +60,8 @@ pub(crate) struct Surface {
     pub(crate) cost: f64,
     /// How single rays find how far they may step.
     pub(crate) means: Means,
+    /// Whether bundles are followed by gradients, not by values alone.
+    pub(crate) gradients: bool,
     /// How camera rays look along themselves.
     pub(crate) looks: Looks,
     /// Most evaluations along one ray.
@@ -163,6 +165,7 @@ impl Surface {
             coarse: None,
             cost: 1.0,
             means: Means::Values,
+            gradients: false,
             looks: Looks::default(),
             steps_max: STEPS_MAX,
             allowance: None,

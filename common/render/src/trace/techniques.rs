@@ -7,6 +7,8 @@
 pub enum Technique {
     /// Rays that stay close to each other are followed together first.
     Bundles,
+    /// Bundles are followed by gradients, too, where that is worth its cost.
+    Gradients,
     /// A value's derivative along the ray proves a stretch, where it is worth its cost.
     Tangents,
     /// The range of that derivative on the stretch ahead proves one, where that is worth its cost.
@@ -39,8 +41,9 @@ pub enum Technique {
 
 impl Technique {
     /// Every technique.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Bundles,
+        Self::Gradients,
         Self::Tangents,
         Self::Stretches,
         Self::Hindsight,
@@ -61,6 +64,7 @@ impl Technique {
     pub fn name(self) -> &'static str {
         match self {
             Self::Bundles => "bundles",
+            Self::Gradients => "bundles by gradients",
             Self::Tangents => "tangents",
             Self::Stretches => "stretches ahead",
             Self::Hindsight => "hindsight",
