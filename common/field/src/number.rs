@@ -170,6 +170,22 @@ impl<const N: usize> Dual<N> {
         let value = binary.value(self.value, other.value);
         self.chain2(other, value, binary.slopes(self.value, other.value, value))
     }
+
+    /// The same with a second number that is constant.
+    #[inline(always)]
+    pub(crate) fn binary_with(self, constant: f64, binary: Binary) -> Self {
+        let value = binary.value(self.value, constant);
+        let (slope, _) = binary.slopes(self.value, constant, value);
+        self.chain(value, slope)
+    }
+
+    /// The same with a first number that is constant.
+    #[inline(always)]
+    pub(crate) fn binary_after(self, constant: f64, binary: Binary) -> Self {
+        let value = binary.value(constant, self.value);
+        let (_, slope) = binary.slopes(constant, self.value, value);
+        self.chain(value, slope)
+    }
 }
 
 impl<const N: usize> Number for Dual<N> {

@@ -14,7 +14,7 @@ use crate::lanes;
 use crate::noise::batch;
 use crate::number::{Dual, Number};
 use crate::points::{BATCH, Points};
-use crate::program::code::{Code, FOOTPRINT, Instruction, Operation};
+use crate::program::code::{Code, FOOTPRINT, INPUTS, Instruction, Operation};
 use crate::program::machine::{self, Count};
 use duals::Duals;
 use octaves::Octaves;
@@ -111,7 +111,11 @@ impl<const N: usize> Slopes<N> {
         let out = &mut *self.result;
         match &instruction.act {
             Operation::Unary(unary) => unary_lanes(*unary, n, a, out),
-            Operation::Binary(binary) => binary_lanes(*binary, n, a, b, out),
+            Operation::Binary(binary) => {
+                let [first, second, _] = instruction.args;
+                let constants = [first, second].map(|register| constant(&self.constants, register));
+                binary_lanes(*binary, n, [a, b], constants, out);
+            }
             Operation::Select => each3(
                 n,
                 [a, b, c],
@@ -254,6 +258,12 @@ impl<const N: usize> Slopes<N> {
     }
 }
 
+/// What a register holds whose number is the same at all points.
+#[inline(always)]
+fn constant(constants: &[f64], register: usize) -> Option<f64> {
+    constants.get(register.checked_sub(INPUTS)?).copied()
+}
+
 const IDENTITY: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
 /// The three derivatives by coordinates; not to be asked of others.
@@ -367,24 +377,41 @@ fn unary_lanes<const N: usize>(unary: Unary, n: usize, a: &Duals<N>, out: &mut D
     lanes!(Neg Abs Sqrt Sin Cos Exp);
 }
 
+/// The same; numbers that are `constants` have no derivatives to reckon with.
 #[inline(always)]
 fn binary_lanes<const N: usize>(
     binary: Binary,
     n: usize,
-    a: &Duals<N>,
-    b: &Duals<N>,
+    [a, b]: [&Duals<N>; 2],
+    constants: [Option<f64>; 2],
     out: &mut Duals<N>,
 ) {
     macro_rules! lanes {
         ($($binary:ident)+) => {
             match binary {
-                $(Binary::$binary => each2(
-                    n,
-                    [a, b],
-                    out,
-                    #[inline(always)]
-                    |a, b| a.binary(b, Binary::$binary),
-                ),)+
+                $(Binary::$binary => match constants {
+                    [_, Some(constant)] => each(
+                        n,
+                        a,
+                        out,
+                        #[inline(always)]
+                        |a| a.binary_with(constant, Binary::$binary),
+                    ),
+                    [Some(constant), None] => each(
+                        n,
+                        b,
+                        out,
+                        #[inline(always)]
+                        |b| b.binary_after(constant, Binary::$binary),
+                    ),
+                    [None, None] => each2(
+                        n,
+                        [a, b],
+                        out,
+                        #[inline(always)]
+                        |a, b| a.binary(b, Binary::$binary),
+                    ),
+                },)+
             }
         };
     }
