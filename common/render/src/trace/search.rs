@@ -90,7 +90,7 @@ impl Search {
                 let Some(span) = waiting.next() else {
                     break;
                 };
-                self.start(rays, span, pause.after);
+                self.start(self.rays.len(), rays, span, pause.after);
             }
             let n = self.rays.len();
             if n == 0 {
@@ -125,7 +125,7 @@ impl Search {
                             end: rows.end[i],
                             steps: rows.count[i],
                         });
-                        self.remove(i);
+                        self.replace(i, rays, &mut waiting, pause.after);
                     }
                     continue;
                 }
@@ -157,19 +157,19 @@ impl Search {
                     counts.exhausted += 1;
                     hits[lane.ray] = Hit::Surface(rows.clear[i]);
                 }
-                self.remove(i);
+                self.replace(i, rays, &mut waiting, pause.after);
             }
         }
     }
 
-    fn start(&mut self, rays: &[Ray], span: &Span, pause: f64) {
+    /// Puts a ray into a lane, the next one or another's; whether it has any point to look at.
+    fn start(&mut self, lane: usize, rays: &[Ray], span: &Span, pause: f64) -> bool {
         let ray = &rays[span.ray];
         let steps = ray.grid.steps();
         let (clear, end) = (steps.from(span.clear), steps.from(span.end));
         if clear > end {
-            return;
+            return false;
         }
-        let lane = self.rays.len();
         self.paths
             .set(lane, ray.origin, ray.direction, ray.from_eye, ray.time);
         let rows = &mut self.rows;
@@ -184,11 +184,29 @@ impl Search {
         rows.seen[lane] = 0.0;
         rows.bend[lane] = 0.0;
         rows.steps.set(lane, steps);
-        self.rays.push(Lane {
+        let begun = Lane {
             ray: span.ray,
             steps,
             pause: span.steps + pause,
-        });
+        };
+        match self.rays.get_mut(lane) {
+            Some(other) => *other = begun,
+            None => self.rays.push(begun),
+        }
+        true
+    }
+
+    /// Puts the next ray into the lane of one that is done, or the last lane's where there is none.
+    fn replace(
+        &mut self,
+        i: usize,
+        rays: &[Ray],
+        waiting: &mut core::slice::Iter<'_, Span>,
+        pause: f64,
+    ) {
+        if !waiting.any(|span| self.start(i, rays, span, pause)) {
+            self.remove(i);
+        }
     }
 
     fn remove(&mut self, i: usize) {
