@@ -1,7 +1,7 @@
 //! Rays that stay close to each other are followed together as far as one answer serves all of them.
 //!
 //! A bundle is a path along the middle of its rays and a radius r(t) that holds every ray's place
-//! at t. One value in the middle proves a stretch of space free of roots for all of them, thesis §7.2.
+//! at t. One value in the middle, or one value and its gradient, proves a stretch of space free of roots for all of them, thesis §7.2.
 //! Where the radius no longer matters little, the bundle splits in four; single rays go on from
 //! there ([`super::search`]). Bundles only say what need not be looked at: no pixel depends on them.
 
@@ -28,7 +28,7 @@ const PARTS: usize = 4;
 const SIZES: [usize; 3] = [PARTS, PARTS * PARTS, PARTS * PARTS * PARTS];
 
 /// A bundle splits where it may step no farther than this share of its radius: sooner where single rays see more.
-fn split(means: Means) -> f64 {
+fn least_share(means: Means) -> f64 {
     match means {
         Means::Stretches => 1.0,
         Means::Tangents | Means::Values | Means::Ranges(_) => 0.25,
@@ -299,7 +299,7 @@ impl Bundles {
                 }
             },
         );
-        let share = split(surface.means);
+        let share = least_share(surface.means);
         for i in (0..n).rev() {
             let lane = &mut self.lanes[i];
             let at = &mut self.at;

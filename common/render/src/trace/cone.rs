@@ -2,12 +2,13 @@
 
 use glam::DVec3;
 
+use super::larger;
 use super::tracer::Ray;
 
 /// Lengths are lengthened by this share, for the rounding of the operations that they come from.
 const ROOM: f64 = 1.0 + 1e-12;
 
-/// What reaches across a cone may reach along it by this share, for the same.
+/// A ray that is so much to the side of the path may be this share of it farther along than computed, by rounding.
 const LEAN: f64 = 1e-12;
 
 /// A path along the middle of some rays, and how far from it they are.
@@ -89,10 +90,6 @@ impl Cone {
             leaning: leaning * ROOM + spread * LEAN,
         })
     }
-}
-
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 #[cfg(test)]

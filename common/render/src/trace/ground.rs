@@ -18,6 +18,7 @@ use glam::DVec3;
 use scene::description::Bound;
 
 use super::clearance::widened;
+use super::larger;
 use crate::view::Footprint;
 use frame::Frame;
 
@@ -291,8 +292,4 @@ impl Bounds<'_> {
         };
         self.field.over_boxes(self.level, &boxes, self.scratch, out);
     }
-}
-
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }

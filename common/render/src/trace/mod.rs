@@ -32,3 +32,9 @@ pub use means::{Arithmetic, Means};
 pub(crate) use surface::Surface;
 pub use techniques::Technique;
 pub(crate) use tracer::{Goal, Hit, Ray, Tracer};
+
+/// The larger of two numbers, by comparison.
+#[inline(always)]
+fn larger(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
