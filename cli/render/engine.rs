@@ -350,9 +350,14 @@ impl Shared<'_> {
     /// Encodes an image whose last block is done.
     fn finish(&self, work: Work) -> Result<Event, Error> {
         let plan = self.plan;
-        let image = work.image;
-        let counts = unpoisoned(work.counts.into_inner());
-        let means = work.renderer.means();
+        let Work {
+            image,
+            renderer,
+            scratch,
+            counts,
+        } = work;
+        let counts = unpoisoned(counts.into_inner());
+        let means = renderer.means();
         let request = FrameRequest {
             folder: plan.folder.clone(),
             stem: plan.stem.clone(),
@@ -373,8 +378,15 @@ impl Shared<'_> {
             },
         };
         let failed = |error| Error::failed(format!("cannot write frame {image}")).because(error);
-        let frame = image::finish(&work.scratch, &request).map_err(failed)?;
-        work.scratch.discard().map_err(failed)?;
+        let frame = thread::scope(|scope| {
+            if request.threads > 1 {
+                // Thousands of small tables take milliseconds to give back. A thread that the system refuses drops them, too.
+                let _ = thread::Builder::new().spawn_scoped(scope, move || drop(renderer));
+            }
+            image::finish(&scratch, &request)
+        });
+        let frame = frame.map_err(failed)?;
+        scratch.discard().map_err(failed)?;
         Ok(Event::Finished(image, frame, counts, means))
     }
 }

@@ -15,10 +15,9 @@ use crate::error::{Cancelled, RenderError};
 use crate::film::{Film, Seen};
 use crate::grids;
 use crate::places::Places;
-use crate::sample::order::{along_curve, arrange};
 use crate::sample::spline::FILTER_ORDER_MAX;
 use crate::sample::strata::RAYS_MAX;
-use crate::sample::{Sample, Strata};
+use crate::sample::{Draws, Order, Sample, Strata};
 use crate::shade::light::{Lit, Lits};
 use crate::shade::{Fields, Palette, Patch, mean_albedo};
 use crate::sky::{Clouds, Crossing, Scanned, Sky};
@@ -235,16 +234,22 @@ impl ImageRenderer {
 
     /// Takes the samples of a part's pixels, in an order in which neighbours share what they can.
     fn take(&self, part: Rect, work: &mut Work) {
-        let Work { samples, from, .. } = work;
-        self.strata.of_pixels(self.surface.level, part, samples);
+        let Work {
+            draws,
+            order,
+            samples,
+            from,
+            ..
+        } = work;
+        let level = self.surface.level;
+        self.strata.of_pixels(level, part, draws, samples);
         if !Technique::Curve.is_used(self.surface.without) {
             from.extend((0..).take(samples.len()));
         } else if self.strata.per_pixel() == 1 {
             // Then the order of pixels is that of samples.
-            along_curve(part, |place| from.push(place));
-            *samples = from.iter().map(|&place| samples[place as usize]).collect();
+            order.along_curve(part, samples, from);
         } else {
-            arrange(samples, [part.x0, part.y0], self.slices, from);
+            order.arrange(samples, [part.x0, part.y0], self.slices, from);
         }
     }
 
@@ -533,6 +538,8 @@ struct Touched {
 /// Memory of one block's rendering, reused from chunk to chunk.
 #[derive(Default)]
 struct Work {
+    draws: Draws,
+    order: Order,
     samples: Vec<Sample>,
     /// From which place each of the samples comes.
     from: Vec<u32>,

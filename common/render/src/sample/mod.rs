@@ -2,8 +2,9 @@
 //!
 //! Thesis §6.2 and §6.3. Nothing here knows what is sampled.
 
-pub(crate) mod order;
+mod order;
 pub(crate) mod spline;
 pub(crate) mod strata;
 
-pub(crate) use strata::{Sample, Strata};
+pub(crate) use order::Order;
+pub(crate) use strata::{Draws, Sample, Strata};

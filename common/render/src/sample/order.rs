@@ -15,8 +15,75 @@ const BEFORE: f64 = 1024.0;
 /// Bits that tell samples apart, beside 16 of the slice and 32 of the curve.
 const INDEX_BITS: u32 = 16;
 
+/// Puts samples in order, in memory that it keeps.
+#[derive(Default)]
+pub(crate) struct Order {
+    /// One number for each sample: its slice, its place along the curve, where it stood.
+    keys: Vec<u64>,
+    sorted: Vec<u64>,
+    /// The samples as they stood.
+    before: Vec<Sample>,
+}
+
+impl Order {
+    /// Puts the samples of a part's pixels, one for each, along a Morton curve about the first pixel; tells from which place each
+    /// one comes.
+    pub(crate) fn along_curve(
+        &mut self,
+        part: Rect,
+        samples: &mut Vec<Sample>,
+        from: &mut Vec<u32>,
+    ) {
+        from.clear();
+        visit_along_curve(part, |place| from.push(place));
+        self.take(samples, from);
+    }
+
+    /// Puts samples in order and tells from which place each one comes.
+    ///
+    /// They are sorted by one of `slices` equal parts of the shutter, then along a Morton curve over
+    /// the image about `corner`, the least pixel of all.
+    pub(crate) fn arrange(
+        &mut self,
+        samples: &mut Vec<Sample>,
+        corner: [u32; 2],
+        slices: u32,
+        from: &mut Vec<u32>,
+    ) {
+        assert!(samples.len() <= 1 << INDEX_BITS);
+        let corner = corner.map(|part| f64::from(part) - BEFORE / CELLS);
+        let key = |(index, sample): (u64, &Sample)| {
+            let [x, y] = [0, 1].map(|axis| whole((sample.place[axis] - corner[axis]) * CELLS));
+            let slice = whole(sample.instant * f64::from(slices));
+            let curve = u64::from(spread(x) | spread(y) << 1);
+            (u64::from(slice) << 32 | curve) << INDEX_BITS | index
+        };
+        self.keys.clear();
+        self.keys.extend((0..).zip(&*samples).map(key));
+        sort(&mut self.keys, &mut self.sorted);
+        from.clear();
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "the low bits alone are wanted"
+        )]
+        from.extend(
+            self.keys
+                .iter()
+                .map(|key| *key as u32 & ((1 << INDEX_BITS) - 1)),
+        );
+        self.take(samples, from);
+    }
+
+    /// Takes the samples in the order of these places.
+    fn take(&mut self, samples: &mut Vec<Sample>, from: &[u32]) {
+        std::mem::swap(samples, &mut self.before);
+        samples.clear();
+        samples.extend(from.iter().map(|&place| self.before[place as usize]));
+    }
+}
+
 /// Calls `visit` with every pixel of a part along a Morton curve about its first one: with its place row by row.
-pub(crate) fn along_curve(part: Rect, mut visit: impl FnMut(u32)) {
+fn visit_along_curve(part: Rect, mut visit: impl FnMut(u32)) {
     let longer = part.width().max(part.height());
     square(part, [0, 0], longer.next_power_of_two(), &mut visit);
 }
@@ -36,45 +103,14 @@ fn square(part: Rect, [x, y]: [u32; 2], side: u32, visit: &mut impl FnMut(u32)) 
     }
 }
 
-/// Puts samples in order and tells from which place each one comes.
-///
-/// They are sorted by one of `slices` equal parts of the shutter, then along a Morton curve over
-/// the image about `corner`, the least pixel of all.
-pub(crate) fn arrange(
-    samples: &mut Vec<Sample>,
-    corner: [u32; 2],
-    slices: u32,
-    from: &mut Vec<u32>,
-) {
-    assert!(samples.len() <= 1 << INDEX_BITS);
-    let corner = corner.map(|part| f64::from(part) - BEFORE / CELLS);
-    // One number for each: its slice, its place along the curve, where it stood.
-    let mut keys: Vec<u64> = (0u64..)
-        .zip(samples.iter())
-        .map(|(index, sample)| {
-            let [x, y] = [0, 1].map(|axis| whole((sample.place[axis] - corner[axis]) * CELLS));
-            let slice = whole(sample.instant * f64::from(slices));
-            let curve = u64::from(spread(x) | spread(y) << 1);
-            (u64::from(slice) << 32 | curve) << INDEX_BITS | index
-        })
-        .collect();
-    sort(&mut keys);
-    from.clear();
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "the low bits alone are wanted"
-    )]
-    from.extend(keys.iter().map(|key| *key as u32 & ((1 << INDEX_BITS) - 1)));
-    *samples = from.iter().map(|&index| samples[index as usize]).collect();
-}
-
 /// Sorts by all bits above the index, whose order stays: by one byte after the other, the least first, where they differ at
-/// all. Of a block's places few do, which makes it several times as fast as comparing.
-fn sort(keys: &mut Vec<u64>) {
+/// all; `sorted` is memory for it. Of a block's places few do, which makes it several times as fast as comparing.
+fn sort(keys: &mut Vec<u64>, sorted: &mut Vec<u64>) {
     const BYTE: u32 = 8;
     let first = keys.first().copied().unwrap_or_default();
     let differ = keys.iter().fold(0, |bits, key| bits | (key ^ first));
-    let mut sorted = vec![0; keys.len()];
+    sorted.clear();
+    sorted.resize(keys.len(), 0);
     for shift in (INDEX_BITS..u64::BITS).step_by(BYTE as usize) {
         let byte = |key: u64| usize::from((key >> shift).to_le_bytes()[0]);
         if byte(differ) == 0 {
@@ -93,7 +129,7 @@ fn sort(keys: &mut Vec<u64>) {
             sorted[*place] = key;
             *place += 1;
         }
-        std::mem::swap(keys, &mut sorted);
+        std::mem::swap(keys, sorted);
     }
 }
 
@@ -132,10 +168,10 @@ mod tests {
                 .collect();
             let mut compared = keys.clone();
             compared.sort_unstable();
-            sort(&mut keys);
+            sort(&mut keys, &mut Vec::new());
             assert_eq!(keys, compared, "{mask:x}");
         }
-        sort(&mut Vec::new());
+        sort(&mut Vec::new(), &mut Vec::new());
     }
 
     #[test]
@@ -148,7 +184,7 @@ mod tests {
                 y1: 32 + height,
             };
             let (mut seen, mut codes) = (Vec::new(), Vec::new());
-            along_curve(part, |place| {
+            visit_along_curve(part, |place| {
                 seen.push(place);
                 codes.push(spread(place % width) | spread(place / width) << 1);
             });
@@ -168,7 +204,7 @@ mod tests {
             .collect();
         let before = samples.clone();
         let mut from = Vec::new();
-        arrange(&mut samples, [640, 320], 4, &mut from);
+        Order::default().arrange(&mut samples, [640, 320], 4, &mut from);
         let mut seen = vec![false; before.len()];
         for (sample, &index) in samples.iter().zip(&from) {
             assert_eq!(*sample, before[index as usize]);

@@ -65,8 +65,14 @@ impl Strata {
         (self.rays * self.rays) as usize
     }
 
-    /// Appends the samples of the pixels of `part`, row by row.
-    pub(crate) fn of_pixels(&self, level: SimdLevel, part: Rect, samples: &mut Vec<Sample>) {
+    /// Appends the samples of the pixels of `part`, row by row; `draws` is memory for their random numbers.
+    pub(crate) fn of_pixels(
+        &self,
+        level: SimdLevel,
+        part: Rect,
+        draws: &mut Draws,
+        samples: &mut Vec<Sample>,
+    ) {
         let places = (part.y0..part.y1).flat_map(|y| (part.x0..part.x1).map(move |x| (x, y)));
         let centre = |(x, y)| [f64::from(x) + 0.5, f64::from(y) + 0.5];
         let Some(filter) = &self.filter else {
@@ -77,11 +83,11 @@ impl Strata {
             return;
         };
         let count = self.per_pixel();
-        let mut draws = Draws::default();
+        draws.clear();
         for pixel in places.clone() {
             level.vectorize(
                 #[inline(always)]
-                || self.draw(pixel, &mut draws),
+                || self.draw(pixel, draws),
             );
             // Fisher and Yates: the instants change places, so that time says nothing about place.
             let first = draws.instant.len() - count;
@@ -140,13 +146,23 @@ impl Strata {
 
 /// Random numbers of the samples of some pixels.
 #[derive(Default)]
-struct Draws {
+pub(crate) struct Draws {
     /// Between 0 and 1 along the row and along the column; then pixels from the centre.
     across: [Vec<f64>; 2],
     /// Each in its part of the shutter.
     instant: Vec<f64>,
     /// With which sample before it a sample changes its instant.
     partner: Vec<u32>,
+}
+
+impl Draws {
+    fn clear(&mut self) {
+        for across in &mut self.across {
+            across.clear();
+        }
+        self.instant.clear();
+        self.partner.clear();
+    }
 }
 
 /// A random number below `limit`.
@@ -179,7 +195,8 @@ mod tests {
             x1: x + 1,
             y1: y + 1,
         };
-        strata.of_pixels(SimdLevel::best(), pixel, &mut samples);
+        let draws = &mut Draws::default();
+        strata.of_pixels(SimdLevel::best(), pixel, draws, &mut samples);
         samples
     }
 
@@ -228,7 +245,7 @@ mod tests {
             let one_by_one: Vec<Sample> = places.flat_map(|(x, y)| pixel(&strata, x, y)).collect();
             for level in SimdLevel::all_available() {
                 let mut samples = Vec::new();
-                strata.of_pixels(level, part, &mut samples);
+                strata.of_pixels(level, part, &mut Draws::default(), &mut samples);
                 assert_eq!(samples, one_by_one, "{}", level.name());
             }
         }
