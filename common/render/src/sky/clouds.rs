@@ -36,6 +36,8 @@ pub(crate) struct Clouds {
     centre: DVec3,
     radius: f64,
     air: Air,
+    /// That of the air before the layer.
+    density: Depth,
 }
 
 /// What a layer of clouds does to the sky behind it.
@@ -98,6 +100,7 @@ impl Clouds {
         Ok(Some(Self {
             program,
             radius: radius + layer.height,
+            density: Depth::density(layer.height / 2.0),
             layer: layer.clone(),
             centre,
             air: Air {
@@ -191,7 +194,7 @@ impl Clouds {
         let left = libm::exp(-depth(crossing.index) / slant);
         let dimmed = libm::exp(-DIMMING * depth(crossing.index + 1));
         let phase = phase(direction.dot(light.sun));
-        let air = Depth::default().and(Depth::density(self.layer.height / 2.0), crossing.way);
+        let air = Depth::default().and(self.density, crossing.way);
         Veil {
             left,
             light: [0, 1, 2].map(|c| {
@@ -261,6 +264,7 @@ mod tests {
                 rayleigh: 1.0,
                 haze: 1.0,
             },
+            density: Depth::density(1_000.0),
         }
     }
 

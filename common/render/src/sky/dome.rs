@@ -122,6 +122,10 @@ impl Dome {
         let (rayleigh, haze) = (rayleigh_phase(cosine), haze_phase(cosine));
         let mut light = [0.0; 3];
         for (row, v) in [(row, 1.0 - v), (row + 1, v)] {
+            // On the horizon, which all surfaces ask for, the first row is all.
+            if v == 0.0 {
+                continue;
+            }
             for (column, u) in [(column, 1.0 - u), (column + 1, u)] {
                 let entry = &self.entries[row * COLUMNS + column];
                 for (c, light) in light.iter_mut().enumerate() {
