@@ -11,7 +11,6 @@ use crate::Counts;
 use crate::sample::Sample;
 use crate::trace::bracket::{Bracket, End};
 use crate::trace::bundle::{Bundles, Span};
-use crate::trace::ground::{Bounds, Ground, Site};
 use crate::trace::means::{self, Means};
 use crate::trace::methods::tests::reference::truth;
 use crate::trace::methods::tests::surfaces::surfaces;
@@ -27,15 +26,15 @@ fn scannable(mut scene: scene::Description) -> scene::Description {
 }
 
 /// The field along a ray, as the search evaluates it.
-struct Values<'a> {
-    surface: &'a Surface,
-    ray: &'a Ray,
-    scratch: &'a mut Scratch,
+pub(super) struct Values<'a> {
+    pub(super) surface: &'a Surface,
+    pub(super) ray: &'a Ray,
+    pub(super) scratch: &'a mut Scratch,
 }
 
 impl Values<'_> {
     /// Values and footprints at some distances.
-    fn at(&mut self, distances: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    pub(super) fn at(&mut self, distances: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let Self {
             surface,
             ray,
@@ -134,7 +133,7 @@ fn rays(surface: &Surface, view: &View, count: u32) -> Vec<Ray> {
         .collect()
 }
 
-fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
+pub(super) fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
     let mut hits = Vec::new();
     let mut counts = Counts::default();
     Tracer::default()
@@ -444,81 +443,6 @@ fn packets_of_any_size_and_order_meet_what_their_rays_meet_alone() {
                 }
             }
         }
-    }
-}
-
-#[test]
-fn where_the_ground_is_clear_the_field_is_positive() {
-    ground_is_clear(scenes::ridges(), 0.1, [0.2, 0.4, 0.5]);
-    ground_is_clear(scenes::planet(), 2.0, [0.2, 0.4, 0.5]);
-}
-
-/// Rays over grounds made for few rays and for many, and what share of their ways to the surface they must at least be led.
-fn ground_is_clear(mut scene: scene::Description, nearest: f64, least: [f64; 3]) {
-    scene.film.resolution.width = 400;
-    let view = View::new(&scene.camera, &scene.film, 0.0);
-    let surface = Surface::new(&scene, &view, SimdLevel::best()).unwrap();
-    let mut scratch = Scratch::new();
-    for (rays, least) in [1.0, 1e4, 1e7].into_iter().zip(least) {
-        let ground = Ground::new(&Site {
-            field: &surface.program,
-            level: surface.level,
-            time: Interval::new(view.instants().0, view.instants().1),
-            bound: &surface.bound,
-            footprint: surface.footprint,
-            eye: view.eye(),
-            travel: view.travel(),
-            nearest,
-            rays,
-        })
-        .unwrap();
-        let (mut way, mut led) = (0.0, 0.0);
-        for index in 0..400u32 {
-            let random = |dimension| unit(hash(&[index, dimension, 11]));
-            let sight = view.sight(&Sample {
-                place: [400.0 * random(0), 300.0 * random(1)],
-                instant: random(2),
-            });
-            let ray = surface.ray(&sight);
-            let Some((clear, end)) = bound::clip(&surface.bound, ray.origin, ray.direction) else {
-                continue;
-            };
-            let mut spans = [Span {
-                ray: 0,
-                clear,
-                end,
-                steps: 0.0,
-            }];
-            let never = AtomicBool::new(false);
-            let rays = std::slice::from_ref(&ray);
-            let bounds = Bounds {
-                field: &surface.program,
-                level: surface.level,
-                scratch: &mut scratch,
-            };
-            ground.lead(bounds, rays, &mut spans, &never).unwrap();
-            let far = spans[0].clear;
-            assert!((clear..=end).contains(&far));
-            let distances: Vec<f64> = (0..=500)
-                .map(|i| clear + (far - clear) * f64::from(i) / 500.0)
-                .collect();
-            let mut values = Values {
-                surface: &surface,
-                ray: &ray,
-                scratch: &mut scratch,
-            };
-            let (values, _) = values.at(&distances);
-            assert!(
-                far == clear || values.iter().all(|value| *value > 0.0),
-                "{ray:?}"
-            );
-            let (hits, _) = trace(&surface, Goal::Distance, std::slice::from_ref(&ray));
-            if let Some(hit) = hits[0].distance() {
-                way += hit - clear;
-                led += far - clear;
-            }
-        }
-        assert!(led > least * way, "{rays} rays: {led} of {way}");
     }
 }
 

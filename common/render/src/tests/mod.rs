@@ -4,6 +4,7 @@ mod analytic;
 mod choice;
 mod golden;
 mod grids;
+mod ground;
 mod guarantee;
 mod led;
 mod same;

@@ -21,9 +21,10 @@ use super::clearance::widened;
 use super::larger;
 use crate::view::Footprint;
 use frame::Frame;
+use lead::single;
 
-/// Columns are wider than their cells by this share of half a side: for rounding, and for the steps from one to the next.
-const ROOM: f64 = 1e-3;
+/// Columns reach over their cells by this share of a side: for rounding, and for the steps from one to the next.
+const ROOM: f64 = 4e-3;
 
 /// Relative room for the rounding of linear functions.
 const CAUTION: f64 = 1e-9;
@@ -43,7 +44,7 @@ const SIDE: usize = 4;
 /// Cells of a block.
 const BLOCK: usize = SIDE * SIDE;
 
-/// Blocks from the eye to the edge of a level, at least and at most: 65,536 blocks of 16 bytes a level, and 512 bytes where some ray comes there.
+/// Blocks from the eye to the edge of a level, at least and at most: 65,536 blocks of 16 bytes a level, and 256 bytes where some ray comes there.
 const HALF: [f64; 2] = [4.0, 128.0];
 
 /// One such block for each so many of the square root of the image's rays. A cell takes as long as two steps of single rays.
@@ -58,13 +59,13 @@ pub(crate) const COST: f64 = 10.0;
 /// Where the error over a cell below the eye is more than this share of the bound's height, cells say too little.
 const ERROR_MAX: f64 = 0.25;
 
-/// A linear function that is nowhere above the field over a cell.
+/// A linear function that is nowhere above the field over a cell, but for the rounding to 32 bits, which whoever asks counts.
 #[derive(Clone, Copy, Debug)]
 struct Below {
     /// At the eye, as if the function went on there.
-    value: f64,
+    value: f32,
     /// Per metre along the frame's axes.
-    slope: DVec3,
+    slope: [f32; 3],
 }
 
 /// Cells that are bounded together, row by row.
@@ -170,8 +171,8 @@ impl Ground {
 
     /// The functions over the cells of that block of the level whose cells are `scale` times as large as the first's.
     #[inline]
-    fn block(&self, bounds: &mut Bounds<'_>, scale: f64, block: usize) -> &Block {
-        let level = &self.levels[(scale.to_bits() >> 52) as usize - 1023];
+    fn block(&self, bounds: &mut Bounds<'_>, scale: f32, block: usize) -> &Block {
+        let level = &self.levels[(scale.to_bits() >> 23) as usize - 127];
         let known = level.blocks.get().and_then(|blocks| blocks[block].get());
         known.unwrap_or_else(|| self.bounded(bounds, level, block))
     }
@@ -206,8 +207,10 @@ impl Ground {
             let size = form.centre.abs() + form.radius();
             let rounding = size * CAUTION + slope.abs().element_sum() * self.size() * ROUNDING;
             Below {
-                value: form.centre - form.error - rounding - slope.dot(place(&columns.middle)),
-                slope,
+                value: single(
+                    form.centre - form.error - rounding - slope.dot(place(&columns.middle)),
+                ),
+                slope: slope.to_array().map(single),
             }
         }))
     }
