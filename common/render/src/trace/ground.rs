@@ -15,6 +15,7 @@ use std::sync::OnceLock;
 
 use field::{Boxes, Interval, Program, Reduced, Scratch, SimdLevel};
 use glam::DVec3;
+use once_cell::race::OnceBox;
 use scene::description::Bound;
 
 use super::clearance::widened;
@@ -44,7 +45,7 @@ const SIDE: usize = 4;
 /// Cells of a block.
 const BLOCK: usize = SIDE * SIDE;
 
-/// Blocks from the eye to the edge of a level, at least and at most: 65,536 blocks of 16 bytes a level, and 256 bytes where some ray comes there.
+/// Blocks from the eye to the edge of a level, at least and at most: 65,536 pointers to blocks a level, and 256 bytes where some ray comes there.
 const HALF: [f64; 2] = [4.0, 128.0];
 
 /// One such block for each so many of the square root of the image's rays. A cell takes as long as two steps of single rays.
@@ -69,15 +70,16 @@ struct Below {
 }
 
 /// Cells that are bounded together, row by row.
-type Block = Box<[Below; BLOCK]>;
+type Block = [Below; BLOCK];
 
-/// Cells of one size around the eye, in blocks row by row; empty until some ray comes there.
+/// Cells of one size around the eye, in blocks row by row; empty until some ray comes there. Where two threads' rays come to one at
+/// the same time both bound it, since waiting takes longer; the same comes of it.
 #[derive(Debug)]
 struct Level {
     side: f64,
     /// How far from the eye it serves rays, by the larger of x and y: not as far as its cells go, for rounding.
     reach: f64,
-    blocks: OnceLock<Box<[OnceLock<Block>]>>,
+    blocks: OnceLock<Box<[OnceBox<Block>]>>,
 }
 
 /// The ground around the eye of one image.
@@ -184,13 +186,13 @@ impl Ground {
         let row = 2 * self.half;
         let blocks = level.blocks.get_or_init(|| {
             let mut blocks = Vec::new();
-            blocks.resize_with(row * row, OnceLock::new);
+            blocks.resize_with(row * row, OnceBox::new);
             blocks.into_boxed_slice()
         });
         blocks[block].get_or_init(|| {
             let first = [block % row, block / row]
                 .map(|blocks| (blocks * SIDE) as f64 - (self.half * SIDE) as f64);
-            self.bound(bounds, level.side, first)
+            Box::new(self.bound(bounds, level.side, first))
         })
     }
 
@@ -199,7 +201,7 @@ impl Ground {
         let columns = self.columns(side, first);
         let mut forms = [Reduced::point(0.0); BLOCK];
         bounds.forms(&columns, &mut forms);
-        Box::new(std::array::from_fn(|i| {
+        std::array::from_fn(|i| {
             let form = &forms[i];
             let place =
                 |parts: &[[f64; BLOCK]; 3]| DVec3::from(parts.each_ref().map(|part| part[i]));
@@ -212,7 +214,7 @@ impl Ground {
                 ),
                 slope: slope.to_array().map(single),
             }
-        }))
+        })
     }
 
     /// The columns above the cells of a block.
