@@ -324,12 +324,14 @@ impl Lanes {
             // In blocks, from the first corner of the level.
             let (across, along) = (x * PER_SIDE + scales.half, y * PER_SIDE + scales.half);
             let (column, row) = (across.floor(), along.floor());
-            let low = least(across, along) >= 0.0;
-            let inside = (most(column, row) < 2.0 * scales.half) & (way(2, t) > scales.floor);
+            // Each compared by itself: what is not a number is in no cell.
+            let low = (across >= 0.0) & (along >= 0.0);
+            let edge = 2.0 * scales.half;
+            let inside = low & (column < edge) & (row < edge) & (way(2, t) > scales.floor);
             let is_sharp = (far + 2.0 * self.away[i]) * BLUR < BLUR_MAX * side;
-            let exists = (finest <= scales.last) & low & inside & is_sharp;
+            let exists = (finest <= scales.last) & inside & is_sharp;
             let within = ((along - row) * SIDE as f32 + (across - column)) * SIDE as f32;
-            self.block[i] = whole(row * (2.0 * scales.half) + column);
+            self.block[i] = whole(row * edge + column);
             self.cell[i] = whole(within);
             self.corner[0][i] = x;
             self.corner[1][i] = y;
@@ -376,7 +378,8 @@ impl Lanes {
             let clear = if is_clear { exit } else { partly };
             let clear = if near > 0.0 { clear } else { t };
             let goes_on = (self.exists[i] > 0.0) & (exit > t);
-            let clear = if goes_on { clear } else { t };
+            // Where a term overflows it is not a number, and proves nothing.
+            let clear = if goes_on & (clear > t) { clear } else { t };
             let is_last = !is_clear & (scale == self.finest[i]);
             let is_done = !goes_on | (clear >= end) | is_last | (self.tries[i] >= TRIES_MAX);
             let in_a_row = if is_clear {
