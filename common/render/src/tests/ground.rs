@@ -16,7 +16,7 @@ use crate::trace::{Goal, Ray, Surface, bound};
 use crate::view::View;
 
 /// The ground of a surface, made for so many rays.
-fn ground(surface: &Surface, view: &View, nearest: f64, rays: f64) -> Ground {
+pub(super) fn ground(surface: &Surface, view: &View, nearest: f64, rays: f64) -> Ground {
     let (open, close) = view.instants();
     let site = Site {
         field: &surface.program,

@@ -3,13 +3,14 @@
 use core::sync::atomic::AtomicBool;
 use std::sync::Arc;
 
-use field::{Interval, SimdLevel};
+use field::SimdLevel;
 use glam::DVec3;
 
+use super::ground::ground;
+use super::guarantee::trace;
 use super::scenes;
 use crate::Counts;
 use crate::sample::Sample;
-use crate::trace::ground::{Ground, Site};
 use crate::trace::surface::Looks;
 use crate::trace::{Goal, Hit, Means, Ray, Surface, Technique, Tracer};
 use crate::view::View;
@@ -34,21 +35,6 @@ fn square(mut scene: scene::Description, width: u32, side: u32) -> (Surface, Vie
     });
     let rays = rays.collect();
     (surface, view, rays)
-}
-
-fn trace(surface: &Surface, goal: Goal, rays: &[Ray]) -> (Vec<Hit>, Counts) {
-    let (mut hits, mut counts) = (Vec::new(), Counts::default());
-    Tracer::default()
-        .trace(
-            surface,
-            goal,
-            rays,
-            &AtomicBool::new(false),
-            &mut counts,
-            &mut hits,
-        )
-        .unwrap();
-    (hits, counts)
 }
 
 /// Rays towards a low sun from where others met the surface.
@@ -80,19 +66,9 @@ fn led_rays_meet_what_others_meet_and_those_that_go_back_need_least() {
             means: Means::Values,
             ..plain
         };
-        let ground = Ground::new(&Site {
-            field: &plain.program,
-            level: plain.level,
-            time: Interval::new(view.instants().0, view.instants().1),
-            bound: &plain.bound,
-            footprint: plain.footprint,
-            eye: view.eye(),
-            travel: view.travel(),
-            nearest,
-            rays: 250_000.0,
-        });
+        let ground = ground(&plain, &view, nearest, 250_000.0);
         let rounds = Surface {
-            ground: Some(Arc::new(ground.unwrap())),
+            ground: Some(Arc::new(ground)),
             ..plain.clone()
         };
         let once = Surface {
