@@ -70,14 +70,13 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
         [header(source, &channels)].into_iter().collect(),
         true,
         |_, chunks| {
-            let of = |strip: &Strip| {
-                let lines = Lines::of(strip, window, &channels);
-                let tiles = compress(&lines).map_err(|error| refused(pending, error))?;
-                Ok((lines.bytes, tiles))
+            let of = |strip: &Strip, Made { lines, zip, tiles }: &mut Made| {
+                lines.take(strip, window, &channels);
+                compress(lines, zip, tiles).map_err(|error| refused(pending, error))
             };
-            let each = |(lines, tiles): (Vec<u8>, Vec<(usize, Chunk)>)| {
-                hasher.samples(&lines);
-                for (number, chunk) in tiles {
+            let each = |Made { lines, tiles, .. }: &mut Made| {
+                hasher.samples(&lines.bytes);
+                for (number, chunk) in tiles.drain(..) {
                     let written = chunks.write_chunk(number, chunk);
                     written.map_err(|error| refused(pending, error))?;
                 }
@@ -123,7 +122,17 @@ fn sort_attributes(mut file: &File) -> io::Result<()> {
     file.write_all(&attributes.concat())
 }
 
+/// What becomes of a strip, and the memory that it takes.
+#[derive(Default)]
+struct Made {
+    lines: Lines,
+    zip: Zip,
+    /// With their numbers in the file.
+    tiles: Vec<(usize, Chunk)>,
+}
+
 /// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
+#[derive(Default)]
 struct Lines {
     /// Number of its row of tiles.
     row: usize,
@@ -135,26 +144,24 @@ struct Lines {
 }
 
 impl Lines {
-    fn of(strip: &Strip, window: Rect, channels: &[usize; CHANNEL_COUNT]) -> Self {
-        let mut bytes = Vec::new();
+    /// Those of a strip, in place of what it held.
+    fn take(&mut self, strip: &Strip, window: Rect, channels: &[usize; CHANNEL_COUNT]) {
+        self.bytes.clear();
         for y in strip.rows() {
             for &channel in channels {
                 let samples = strip.row(channel, y);
                 match CHANNELS[channel].storage {
-                    Storage::Half => append_half_bytes(samples, &mut bytes),
-                    Storage::Float => append_le_bytes(samples, &mut bytes),
+                    Storage::Half => append_half_bytes(samples, &mut self.bytes),
+                    Storage::Float => append_le_bytes(samples, &mut self.bytes),
                 }
             }
         }
-        Self {
-            row: (strip.rows().start - window.y0) as usize / TILE,
-            width: window.width() as usize,
-            sizes: channels.map(|channel| match CHANNELS[channel].storage {
-                Storage::Half => size_of::<f16>(),
-                Storage::Float => size_of::<f32>(),
-            }),
-            bytes,
-        }
+        self.row = (strip.rows().start - window.y0) as usize / TILE;
+        self.width = window.width() as usize;
+        self.sizes = channels.map(|channel| match CHANNELS[channel].storage {
+            Storage::Half => size_of::<f16>(),
+            Storage::Float => size_of::<f32>(),
+        });
     }
 
     /// The samples of a tile: for each row, for each channel.
@@ -174,10 +181,9 @@ impl Lines {
 }
 
 /// The tiles of a strip with their numbers in the file.
-fn compress(lines: &Lines) -> Result<Vec<(usize, Chunk)>, ExrError> {
-    let mut zip = Zip::new();
+fn compress(lines: &Lines, zip: &mut Zip, tiles: &mut Vec<(usize, Chunk)>) -> Result<(), ExrError> {
     let columns = lines.width.div_ceil(TILE);
-    let tile = |column| {
+    for column in 0..columns {
         let compressed_pixels_le = zip.compress(lines.tile(column)).map_err(io::Error::from)?;
         let block = CompressedTileBlock {
             coordinates: TileCoordinates {
@@ -190,9 +196,9 @@ fn compress(lines: &Lines) -> Result<Vec<(usize, Chunk)>, ExrError> {
             layer_index: 0,
             compressed_block: CompressedBlock::Tile(block),
         };
-        Ok((lines.row * columns + column, chunk))
-    };
-    (0..columns).map(tile).collect()
+        tiles.push((lines.row * columns + column, chunk));
+    }
+    Ok(())
 }
 
 /// Appends the nearest halves, little-endian; the largest finite one for what lies beyond.

@@ -29,33 +29,12 @@ impl Depth {
         }
     }
 
-    /// The rows of a strip.
-    pub(super) fn encode(self, strip: &Strip, display: &Display) -> Rows {
-        let mut rows = Rows::default();
-        for y in strip.rows() {
-            let [red, green, blue] = [0, 1, 2].map(|channel| strip.row(channel, y));
-            let row = rows.interleaved.len();
-            for ((red, green), blue) in red.iter().zip(green).zip(blue) {
-                for code in display.codes([*red, *green, *blue]) {
-                    let bytes = code.to_be_bytes();
-                    match self {
-                        Self::Eight => rows.interleaved.push(bytes[1]),
-                        Self::Sixteen => rows.interleaved.extend(bytes),
-                    }
-                }
-            }
-            let row = &rows.interleaved[row..];
-            for channel in [2, 1, 0] {
-                match self {
-                    Self::Eight => rows.hashed.extend(row.iter().skip(channel).step_by(3)),
-                    Self::Sixteen => rows.hashed.extend(
-                        row.chunks_exact(6)
-                            .flat_map(|pixel| [pixel[2 * channel + 1], pixel[2 * channel]]),
-                    ),
-                }
-            }
+    /// The rows of a strip, in place of what `rows` held.
+    pub(super) fn encode(self, strip: &Strip, display: &Display, rows: &mut Rows) {
+        match self {
+            Self::Eight => rows.take::<1>(strip, display),
+            Self::Sixteen => rows.take::<2>(strip, display),
         }
-        rows
     }
 }
 
@@ -66,6 +45,37 @@ pub(super) struct Rows {
     pub(super) interleaved: Vec<u8>,
     /// The same as the digest of stored values takes it: for each row all of B, G and R, little-endian.
     pub(super) hashed: Vec<u8>,
+}
+
+impl Rows {
+    /// Those of a strip, with so many bytes a sample.
+    fn take<const BYTES: usize>(&mut self, strip: &Strip, display: &Display) {
+        let width = strip.row(0, strip.rows().start).len();
+        for stored in [&mut self.interleaved, &mut self.hashed] {
+            stored.resize(strip.rows().len() * width * 3 * BYTES, 0);
+        }
+        let (samples, _) = self.interleaved.as_chunks_mut::<BYTES>();
+        let (pixels, _) = samples.as_chunks_mut::<3>();
+        let (hashed, _) = self.hashed.as_chunks_mut::<BYTES>();
+        let rows = pixels.chunks_mut(width).zip(hashed.chunks_mut(3 * width));
+        for (y, (pixels, hashed)) in strip.rows().zip(rows) {
+            let [red, green, blue] = [0, 1, 2].map(|channel| strip.row(channel, y));
+            let (hashed_blue, rest) = hashed.split_at_mut(width);
+            let (hashed_green, hashed_red) = rest.split_at_mut(width);
+            for (i, pixel) in pixels.iter_mut().enumerate() {
+                let codes = display.codes([red[i], green[i], blue[i]]);
+                let bytes = codes.map(|code| code.to_le_bytes());
+                for (stored, bytes) in pixel.iter_mut().zip(bytes) {
+                    for (stored, byte) in stored.iter_mut().rev().zip(bytes) {
+                        *stored = byte;
+                    }
+                }
+                let [red, green, blue] =
+                    bytes.map(|bytes| std::array::from_fn(|place| bytes[place]));
+                (hashed_red[i], hashed_green[i], hashed_blue[i]) = (red, green, blue);
+            }
+        }
+    }
 }
 
 /// Writes the frame and returns the digest of what it stores.
@@ -87,8 +97,11 @@ pub(super) fn write(
     );
     let mut writer = encoder.and_then(Encoder::write_header).map_err(failed)?;
     let mut stream = writer.stream_writer().map_err(failed)?;
-    let of = |strip: &Strip| Ok(depth.encode(strip, &display));
-    let each = |rows: Rows| {
+    let of = |strip: &Strip, rows: &mut Rows| {
+        depth.encode(strip, &display, rows);
+        Ok(())
+    };
+    let each = |rows: &mut Rows| {
         hasher.samples(&rows.hashed);
         stream
             .write_all(&rows.interleaved)

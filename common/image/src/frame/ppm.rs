@@ -21,8 +21,11 @@ pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, Im
     hash_head(&mut hasher, window, Depth::Eight);
     let mut out = BufWriter::with_capacity(1 << 16, pending.file());
     write!(out, "P6\n{} {}\n255\n", window.width(), window.height()).map_err(failed)?;
-    let of = |strip: &Strip| Ok(Depth::Eight.encode(strip, &display));
-    let each = |rows: Rows| {
+    let of = |strip: &Strip, rows: &mut Rows| {
+        Depth::Eight.encode(strip, &display, rows);
+        Ok(())
+    };
+    let each = |rows: &mut Rows| {
         hasher.samples(&rows.hashed);
         out.write_all(&rows.interleaved).map_err(failed)
     };

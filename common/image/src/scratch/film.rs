@@ -38,17 +38,17 @@ impl Scratch {
             hasher.update(channel.name.as_bytes());
         }
         // By the strip: of short pieces the hash takes several times as long.
-        let bytes = |strip: &Strip| {
-            let mut bytes = Vec::new();
+        let bytes = |strip: &Strip, bytes: &mut Vec<u8>| {
+            bytes.clear();
             for y in strip.rows() {
                 for channel in 0..CHANNEL_COUNT {
-                    append_le_bytes(strip.row(channel, y), &mut bytes);
+                    append_le_bytes(strip.row(channel, y), bytes);
                 }
             }
-            Ok(bytes)
+            Ok(())
         };
         self.for_each_strip(threads, bytes, |bytes| {
-            hasher.update(&bytes);
+            hasher.update(bytes);
             Ok(())
         })?;
         Ok(Digest(*hasher.finalize().as_bytes()))

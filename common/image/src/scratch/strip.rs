@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 use std::os::unix::fs::FileExt;
+use std::sync::Mutex;
 
 use model::Rect;
 use model::film::CHANNEL_COUNT;
 use model::rect::GRID_SQUARE;
 
-use super::Scratch;
 use super::grid::SLOT_BYTES;
+use super::{Scratch, lock};
 use crate::error::ImageError;
 use crate::share::in_sequence;
 
@@ -46,16 +47,36 @@ impl Strip {
     }
 }
 
+/// Memory of one strip. It goes from strip to strip: what is given back after each, the system takes and clears again every time.
+struct Memory<R> {
+    slot: Vec<u8>,
+    strip: Strip,
+    made: R,
+}
+
+impl<R: Default> Memory<R> {
+    fn new(rect: Rect) -> Self {
+        Self {
+            slot: vec![0; SLOT_BYTES],
+            strip: Strip {
+                rect,
+                samples: Vec::new(),
+            },
+            made: R::default(),
+        }
+    }
+}
+
 impl Scratch {
     /// Hands what `of` makes of each strip of the window to `each`, from the top on this thread, while `threads` − 1 others
-    /// go on with the next strips.
+    /// go on with the next strips. What is made takes the place of what was made of an earlier strip.
     ///
     /// Fails if pixels are missing, if the system refuses, or with the first failure of `of` or `each`.
-    pub(crate) fn for_each_strip<R: Send>(
+    pub(crate) fn for_each_strip<R: Default + Send>(
         &self,
         threads: usize,
-        of: impl Fn(&Strip) -> Result<R, ImageError> + Sync,
-        mut each: impl FnMut(R) -> Result<(), ImageError>,
+        of: impl Fn(&Strip, &mut R) -> Result<(), ImageError> + Sync,
+        mut each: impl FnMut(&mut R) -> Result<(), ImageError>,
     ) -> Result<(), ImageError> {
         self.require_complete()?;
         let window = self.window();
@@ -69,22 +90,31 @@ impl Scratch {
         let bytes = CHANNEL_COUNT * 4 * window.width() as usize * STRIP_ROWS as usize;
         let ahead = (AHEAD_BYTES / bytes).clamp(1, 2 * threads.max(1));
         let threads = threads.min(ahead);
-        let read = |rect| self.strip(rect).and_then(|strip| of(&strip));
-        in_sequence(strips, threads, ahead, read, |made| each(made?))
+        let spare: Mutex<Vec<Memory<R>>> = Mutex::default();
+        let make = |rect| {
+            let mut memory = lock(&spare).pop().unwrap_or_else(|| Memory::new(rect));
+            self.read(rect, &mut memory)?;
+            of(&memory.strip, &mut memory.made)?;
+            Ok(memory)
+        };
+        in_sequence(strips, threads, ahead, make, |memory| {
+            let mut memory = memory?;
+            each(&mut memory.made)?;
+            lock(&spare).push(memory);
+            Ok(())
+        })
     }
 
-    /// Reads some rows of the window.
-    fn strip(&self, rect: Rect) -> Result<Strip, ImageError> {
+    /// Reads some rows of the window into a strip, whatever it held.
+    fn read<R>(&self, rect: Rect, memory: &mut Memory<R>) -> Result<(), ImageError> {
+        let Memory { slot, strip, .. } = memory;
+        strip.rect = rect;
         let pixels = rect.width() as usize * rect.height() as usize;
-        let mut strip = Strip {
-            rect,
-            samples: vec![0.0; CHANNEL_COUNT * pixels],
-        };
-        let mut slot = vec![0; SLOT_BYTES];
+        strip.samples.resize(CHANNEL_COUNT * pixels, 0.0);
         for block in rect.blocks() {
-            self.fill(&mut strip, block, &mut slot)?;
+            self.fill(strip, block, slot)?;
         }
-        Ok(strip)
+        Ok(())
     }
 
     /// Copies one block into its place in the strip.
