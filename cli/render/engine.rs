@@ -1,8 +1,8 @@
 //! Renders images in this process, on threads of its own.
 //!
 //! Blocks go into each image's scratch file as they are done, so that an interrupted
-//! render goes on where it was; a finished image is encoded by the thread that rendered
-//! its last block, while the others render the next image.
+//! render goes on where it was. Rows that are done are encoded by whoever rendered the last of them, and what is left of an image
+//! by the thread that rendered its last block, while the others render the next image.
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -13,8 +13,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use image::{
-    FinishedFrame, Formats, FrameMetadata, FrameRequest, Opened, Scratch, ScratchIdentity,
-    ViewTransform,
+    Encoding, FinishedFrame, Formats, FrameMetadata, FrameRequest, Opened, Scratch,
+    ScratchIdentity, ViewTransform,
 };
 use model::{Digest, ImageNumber, Rect, Resolution};
 use render::{Assets, Counts, EvalSettings, ImageRenderer, Means};
@@ -106,6 +106,7 @@ struct Work {
     image: ImageNumber,
     renderer: ImageRenderer,
     scratch: Scratch,
+    encoding: Encoding,
     counts: Mutex<Counts>,
 }
 
@@ -241,6 +242,12 @@ impl Shared<'_> {
         }
     }
 
+    fn view(&self) -> ViewTransform {
+        ViewTransform {
+            exposure_stops: self.plan.description.film.exposure,
+        }
+    }
+
     /// One thread's life, and where its time went.
     fn work(&self, events: &Sender<Event>, spent: &mut Spent) {
         let mut buffers = Buffers::default();
@@ -309,6 +316,7 @@ impl Shared<'_> {
         let work = Work {
             image,
             renderer,
+            encoding: Encoding::new(&scratch, plan.formats, self.view()),
             scratch,
             counts: Mutex::default(),
         };
@@ -341,6 +349,8 @@ impl Shared<'_> {
         stored.map_err(|error| {
             Error::failed(format!("cannot keep a part of frame {}", work.image)).because(error)
         })?;
+        timed(&mut spent.encoding, || work.encoding.go_on(&work.scratch))
+            .map_err(|error| cannot_write(work.image).because(error))?;
         self.pixels.fetch_add(block.area(), Ordering::Relaxed);
         self.rays.fetch_add(counts.rays, Ordering::Relaxed);
         *unpoisoned(work.counts.lock()) += counts;
@@ -354,6 +364,7 @@ impl Shared<'_> {
             image,
             renderer,
             scratch,
+            encoding,
             counts,
         } = work;
         let counts = unpoisoned(counts.into_inner());
@@ -367,9 +378,7 @@ impl Shared<'_> {
                 statistics: told(&counts, means),
                 ..plan.metadata.clone()
             },
-            view: ViewTransform {
-                exposure_stops: plan.description.film.exposure,
-            },
+            view: self.view(),
             // The other threads have nothing else to do where nothing is left to start.
             threads: if self.line.is_empty() {
                 plan.threads
@@ -377,18 +386,22 @@ impl Shared<'_> {
                 1
             },
         };
-        let failed = |error| Error::failed(format!("cannot write frame {image}")).because(error);
+        let failed = |error| cannot_write(image).because(error);
         let frame = thread::scope(|scope| {
             if request.threads > 1 {
                 // Thousands of small tables take milliseconds to give back. A thread that the system refuses drops them, too.
                 let _ = thread::Builder::new().spawn_scoped(scope, move || drop(renderer));
             }
-            image::finish(&scratch, &request)
+            encoding.finish(&scratch, &request)
         });
         let frame = frame.map_err(failed)?;
         scratch.discard().map_err(failed)?;
         Ok(Event::Finished(image, frame, counts, means))
     }
+}
+
+fn cannot_write(image: ImageNumber) -> Error {
+    Error::failed(format!("cannot write frame {image}"))
 }
 
 /// A thread's memory between blocks.

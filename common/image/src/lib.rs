@@ -27,7 +27,7 @@ pub use digest::file_digest;
 pub use error::ImageError;
 pub use frame::formats::{BadFormats, Format, Formats, frame_name};
 pub use frame::metadata::{FrameMetadata, METADATA_TEXT_MAX};
-pub use frame::{FinishedFile, FinishedFrame, FrameRequest, finish};
+pub use frame::{Encoding, FinishedFile, FinishedFrame, FrameRequest, finish};
 pub use info::{ChannelInfo, FrameInfo, PartInfo, info};
 pub use read::{DECODED_BYTES_MAX, FileKind, SampleKind, Window};
 pub use scratch::{Opened, Scratch, ScratchIdentity};

@@ -8,6 +8,7 @@ use std::fs::File;
 use std::io::{
     self, BufRead as _, BufReader, BufWriter, Read as _, Seek as _, SeekFrom, Write as _,
 };
+use std::path::Path;
 
 use exr::block::chunk::{Chunk, CompressedBlock, CompressedTileBlock, TileCoordinates};
 use exr::block::writer::ChunksWriter;
@@ -31,7 +32,7 @@ use super::zip::Zip;
 use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
-use crate::scratch::{Strip, append_le_bytes};
+use crate::scratch::{Scratch, Strip, append_le_bytes};
 
 // The `exr` crate takes samples in the machine's order of bytes, the digest little-endian ones;
 // the same lines serve both.
@@ -49,52 +50,109 @@ const HEADER_FROM: u64 = 8;
 /// Largest finite half; light beyond it is stored as this, never as infinity.
 const HALF_MAX: f32 = 65_504.0;
 
-/// Writes the frame and returns the digest of what it stores.
-pub(super) fn write(source: &Source<'_>, pending: &Pending) -> Result<Digest, ImageError> {
-    let window = source.scratch.window();
-    let channels = sorted_channels();
-    let mut hasher = StoredHasher::new(FileKind::Exr, 1);
-    hasher.part(
-        "",
-        Window::of(window),
-        Window::of(source.scratch.identity().resolution.rect()),
-        channels
-            .iter()
-            .map(|index| (CHANNELS[*index].name, sample_kind(*index))),
-    );
-    let mut out = BufWriter::with_capacity(1 << 16, pending.file());
-    // An error of ours has to pass through the crate's closure, which knows its own only.
-    let mut ours = None;
-    exr::block::write(
-        &mut out,
-        [header(source, &channels)].into_iter().collect(),
-        true,
-        |_, chunks| {
-            let of = |strip: &Strip, Made { lines, zip, tiles }: &mut Made| {
-                lines.take(strip, window, &channels);
-                compress(lines, zip, tiles).map_err(|error| refused(pending, error))
-            };
-            let each = |Made { lines, tiles, .. }: &mut Made| {
-                hasher.samples(&lines.bytes);
-                for (number, chunk) in tiles.drain(..) {
-                    let written = chunks.write_chunk(number, chunk);
-                    written.map_err(|error| refused(pending, error))?;
+/// An EXR in the making.
+pub(super) struct Begun {
+    window: Rect,
+    channels: [usize; CHANNEL_COUNT],
+    hasher: StoredHasher,
+    /// Tiles from the window's top.
+    made: Made,
+    kept: usize,
+}
+
+impl Begun {
+    /// Of a film's pixels.
+    pub(super) fn new(scratch: &Scratch) -> Self {
+        let window = scratch.window();
+        let channels = sorted_channels();
+        let mut hasher = StoredHasher::new(FileKind::Exr, 1);
+        hasher.part(
+            "",
+            Window::of(window),
+            Window::of(scratch.identity().resolution.rect()),
+            channels
+                .iter()
+                .map(|index| (CHANNELS[*index].name, sample_kind(*index))),
+        );
+        Self {
+            window,
+            channels,
+            hasher,
+            made: Made::default(),
+            kept: 0,
+        }
+    }
+
+    /// Takes the next strip of a scratch file.
+    pub(super) fn take(&mut self, scratch: &Scratch, strip: &Strip) -> Result<(), ImageError> {
+        let first = self.made.tiles.len();
+        let Made { lines, zip, tiles } = &mut self.made;
+        lines.take(strip, self.window, &self.channels);
+        compress(lines, zip, tiles).map_err(|error| refused(scratch.path(), error))?;
+        self.hasher.samples(&self.made.lines.bytes);
+        for (_, chunk) in &mut self.made.tiles[first..] {
+            if let CompressedBlock::Tile(block) = &mut chunk.compressed_block {
+                // Room for what did not become smaller was for that one alone.
+                block.compressed_pixels_le.shrink_to_fit();
+                self.kept += block.compressed_pixels_le.len();
+            }
+        }
+        Ok(())
+    }
+
+    /// Bytes that it keeps.
+    pub(super) fn kept(&self) -> usize {
+        self.kept
+    }
+
+    /// Writes the frame and returns the digest of what it stores.
+    pub(super) fn write(
+        self,
+        source: &Source<'_>,
+        pending: &Pending,
+    ) -> Result<Digest, ImageError> {
+        let Self {
+            window,
+            channels,
+            mut hasher,
+            made,
+            ..
+        } = self;
+        let mut out = BufWriter::with_capacity(1 << 16, pending.file());
+        // An error of ours has to pass through the crate's closure, which knows its own only.
+        let mut ours = None;
+        let failed = |error| refused(pending.target(), error);
+        exr::block::write(
+            &mut out,
+            [header(source, &channels)].into_iter().collect(),
+            true,
+            |_, chunks| {
+                for (number, chunk) in made.tiles {
+                    chunks.write_chunk(number, chunk)?;
                 }
-                Ok(())
-            };
-            let threads = source.request.threads;
-            let result = source.scratch.for_each_strip(threads, of, each);
-            result.map_err(|error| {
-                ours = Some(error);
-                ExrError::Aborted
-            })
-        },
-    )
-    .map_err(|error| ours.take().unwrap_or_else(|| refused(pending, error)))?;
-    let io = |source| ImageError::io("write", pending.target(), source);
-    out.flush().map_err(io)?;
-    sort_attributes(pending.file()).map_err(io)?;
-    Ok(hasher.finish())
+                let of = |strip: &Strip, Made { lines, zip, tiles }: &mut Made| {
+                    lines.take(strip, window, &channels);
+                    compress(lines, zip, tiles).map_err(failed)
+                };
+                let each = |Made { lines, tiles, .. }: &mut Made| {
+                    hasher.samples(&lines.bytes);
+                    for (number, chunk) in tiles.drain(..) {
+                        chunks.write_chunk(number, chunk).map_err(failed)?;
+                    }
+                    Ok(())
+                };
+                source.for_each_strip(of, each).map_err(|error| {
+                    ours = Some(error);
+                    ExrError::Aborted
+                })
+            },
+        )
+        .map_err(|error| ours.take().unwrap_or_else(|| failed(error)))?;
+        let io = |source| ImageError::io("write", pending.target(), source);
+        out.flush().map_err(io)?;
+        sort_attributes(pending.file()).map_err(io)?;
+        Ok(hasher.finish())
+    }
 }
 
 /// Puts the attributes of a file's header in the order of their names: the `exr` crate leaves some in that of a hash map,
@@ -279,11 +337,11 @@ fn text(text: &str) -> Text {
     Text::from_slice_unchecked(text.as_bytes())
 }
 
-fn refused(pending: &Pending, error: ExrError) -> ImageError {
+fn refused(path: &Path, error: ExrError) -> ImageError {
     match error {
-        ExrError::Io(source) => ImageError::io("write", pending.target(), source),
+        ExrError::Io(source) => ImageError::io("write", path, source),
         other => ImageError::Encode {
-            path: pending.target().to_owned(),
+            path: path.to_owned(),
             source: other.into(),
         },
     }

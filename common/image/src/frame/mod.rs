@@ -3,6 +3,7 @@
 //! Every format is written strip by strip under a hidden name; only when all of them are whole
 //! and synced do they get their names, so that a frame that can be seen is a frame that is done.
 
+mod encoding;
 pub(crate) mod exr;
 pub(crate) mod formats;
 pub(crate) mod metadata;
@@ -15,12 +16,11 @@ use std::path::PathBuf;
 
 use model::{Digest, ImageNumber};
 
-use self::formats::{Format, Formats, frame_name};
+pub use self::encoding::Encoding;
+use self::formats::{Format, Formats};
 use self::metadata::FrameMetadata;
-use self::publish::{Pending, sync_folder_of};
 use crate::error::ImageError;
-use crate::scratch::Scratch;
-use crate::share::in_order;
+use crate::scratch::{Scratch, Strip};
 use crate::view::ViewTransform;
 
 /// What to make of a finished scratch file.
@@ -69,6 +69,19 @@ struct Source<'a> {
     scratch: &'a Scratch,
     request: &'a FrameRequest,
     film_digest: Digest,
+    /// The first row of pixels that has not been encoded.
+    row: u32,
+}
+
+impl Source<'_> {
+    /// [`Scratch::for_each_strip`] of what has not been encoded.
+    fn for_each_strip<R: Default + Send>(
+        &self,
+        of: impl Fn(&Strip, &mut R) -> Result<(), ImageError> + Sync,
+        each: impl FnMut(&mut R) -> Result<(), ImageError>,
+    ) -> Result<(), ImageError> {
+        (self.scratch).for_each_strip(self.row, self.request.threads, of, each)
+    }
 }
 
 /// Encodes a finished scratch file into frames and puts them in place, durably.
@@ -77,65 +90,7 @@ struct Source<'a> {
 /// named, if pixels are missing, the request cannot be met, or the system refuses; the scratch
 /// file stays as it is in any case.
 pub fn finish(scratch: &Scratch, request: &FrameRequest) -> Result<FinishedFrame, ImageError> {
-    check(request)?;
-    let source = Source {
-        scratch,
-        request,
-        film_digest: scratch.film_digest_by(request.threads)?,
-    };
-    let formats: Vec<Format> = request.formats.iter().collect();
-    let written = in_order(formats, request.threads, |format| write(&source, format));
-    let written: Vec<Written> = written.into_iter().collect::<Result<_, _>>()?;
-    let mut files = Vec::new();
-    for Written {
-        pending,
-        format,
-        digest,
-        bytes,
-    } in written
-    {
-        let path = pending.publish()?;
-        files.push(FinishedFile {
-            path,
-            format,
-            digest,
-            bytes,
-        });
-    }
-    if let Some(file) = files.first() {
-        sync_folder_of(&file.path)?;
-    }
-    Ok(FinishedFrame {
-        film_digest: source.film_digest,
-        files,
-    })
-}
-
-/// A frame that is whole and durable, and has no name yet.
-struct Written {
-    pending: Pending,
-    format: Format,
-    digest: Digest,
-    bytes: u64,
-}
-
-fn write(source: &Source<'_>, format: Format) -> Result<Written, ImageError> {
-    let request = source.request;
-    let name = frame_name(&request.stem, request.number, format);
-    let pending = Pending::create(&request.folder, &name)?;
-    let digest = match format {
-        Format::Exr => exr::write(source, &pending),
-        Format::Png8 => png::write(source, &pending, png::Depth::Eight),
-        Format::Png16 => png::write(source, &pending, png::Depth::Sixteen),
-        Format::Ppm => ppm::write(source, &pending),
-    }?;
-    let bytes = pending.sync()?;
-    Ok(Written {
-        pending,
-        format,
-        digest,
-        bytes,
-    })
+    Encoding::new(scratch, request.formats, request.view).finish(scratch, request)
 }
 
 fn check(request: &FrameRequest) -> Result<(), ImageError> {

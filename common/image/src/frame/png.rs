@@ -12,7 +12,7 @@ use crate::digest::StoredHasher;
 use crate::error::ImageError;
 use crate::read::{FileKind, SampleKind, Window};
 use crate::scratch::Strip;
-use crate::view::Display;
+use crate::view::{Display, ViewTransform};
 
 /// Bits of one sample.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -30,7 +30,7 @@ impl Depth {
     }
 
     /// The rows of a strip, in place of what `rows` held.
-    pub(super) fn encode(self, strip: &Strip, display: &Display, rows: &mut Rows) {
+    fn encode(self, strip: &Strip, display: &Display, rows: &mut Rows) {
         match self {
             Self::Eight => rows.take::<1>(strip, display),
             Self::Sixteen => rows.take::<2>(strip, display),
@@ -40,11 +40,11 @@ impl Depth {
 
 /// Some rows of a PNG or PPM.
 #[derive(Default)]
-pub(super) struct Rows {
+struct Rows {
     /// R, G, B per pixel; 16 bits big-endian.
-    pub(super) interleaved: Vec<u8>,
+    interleaved: Vec<u8>,
     /// The same as the digest of stored values takes it: for each row all of B, G and R, little-endian.
-    pub(super) hashed: Vec<u8>,
+    hashed: Vec<u8>,
 }
 
 impl Rows {
@@ -78,39 +78,94 @@ impl Rows {
     }
 }
 
-/// Writes the frame and returns the digest of what it stores.
-pub(super) fn write(
-    source: &Source<'_>,
-    pending: &Pending,
+/// A PNG or PPM in the making.
+pub(super) struct Begun {
     depth: Depth,
-) -> Result<Digest, ImageError> {
-    let failed = |error| refused(pending, error);
-    let window = source.scratch.window();
-    let display = source.request.view.prepare(depth.top());
-    let mut hasher = StoredHasher::new(FileKind::Png, 1);
-    hash_head(&mut hasher, window, depth);
-    let out = BufWriter::with_capacity(1 << 16, pending.file());
-    let encoder = describe(
-        source,
-        Encoder::new(out, window.width(), window.height()),
-        depth,
-    );
-    let mut writer = encoder.and_then(Encoder::write_header).map_err(failed)?;
-    let mut stream = writer.stream_writer().map_err(failed)?;
-    let of = |strip: &Strip, rows: &mut Rows| {
-        depth.encode(strip, &display, rows);
-        Ok(())
-    };
-    let each = |rows: &mut Rows| {
-        hasher.samples(&rows.hashed);
-        stream
-            .write_all(&rows.interleaved)
-            .map_err(|error| ImageError::io("write", pending.target(), error))
-    };
-    (source.scratch).for_each_strip(source.request.threads, of, each)?;
-    stream.finish().map_err(failed)?;
-    writer.finish().map_err(failed)?;
-    Ok(hasher.finish())
+    display: Display,
+    hasher: StoredHasher,
+    /// Rows from the window's top.
+    samples: Vec<u8>,
+    /// Memory of a strip's.
+    rows: Rows,
+}
+
+impl Begun {
+    /// Of a window's pixels.
+    pub(super) fn new(kind: FileKind, depth: Depth, window: Rect, view: ViewTransform) -> Self {
+        let mut hasher = StoredHasher::new(kind, 1);
+        hash_head(&mut hasher, window, depth);
+        Self {
+            depth,
+            display: view.prepare(depth.top()),
+            hasher,
+            samples: Vec::new(),
+            rows: Rows::default(),
+        }
+    }
+
+    /// Takes the next strip.
+    pub(super) fn take(&mut self, strip: &Strip) {
+        self.depth.encode(strip, &self.display, &mut self.rows);
+        self.hasher.samples(&self.rows.hashed);
+        self.samples.extend_from_slice(&self.rows.interleaved);
+    }
+
+    /// Bytes that it keeps.
+    pub(super) fn kept(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Writes what there is and all rows that are to come; returns the digest of what is stored.
+    pub(super) fn write_rows(
+        self,
+        source: &Source<'_>,
+        mut write: impl FnMut(&[u8]) -> Result<(), ImageError>,
+    ) -> Result<Digest, ImageError> {
+        let Self {
+            depth,
+            display,
+            mut hasher,
+            samples,
+            ..
+        } = self;
+        write(&samples)?;
+        let of = |strip: &Strip, rows: &mut Rows| {
+            depth.encode(strip, &display, rows);
+            Ok(())
+        };
+        let each = |rows: &mut Rows| {
+            hasher.samples(&rows.hashed);
+            write(&rows.interleaved)
+        };
+        source.for_each_strip(of, each)?;
+        Ok(hasher.finish())
+    }
+
+    /// Writes a PNG and returns the digest of what it stores.
+    pub(super) fn write(
+        self,
+        source: &Source<'_>,
+        pending: &Pending,
+    ) -> Result<Digest, ImageError> {
+        let failed = |error| refused(pending, error);
+        let window = source.scratch.window();
+        let out = BufWriter::with_capacity(1 << 16, pending.file());
+        let encoder = describe(
+            source,
+            Encoder::new(out, window.width(), window.height()),
+            self.depth,
+        );
+        let mut writer = encoder.and_then(Encoder::write_header).map_err(failed)?;
+        let mut stream = writer.stream_writer().map_err(failed)?;
+        let digest = self.write_rows(source, |samples| {
+            stream
+                .write_all(samples)
+                .map_err(|error| ImageError::io("write", pending.target(), error))
+        })?;
+        stream.finish().map_err(failed)?;
+        writer.finish().map_err(failed)?;
+        Ok(digest)
+    }
 }
 
 /// Depth, colour space and metadata.
@@ -150,7 +205,7 @@ fn refused(pending: &Pending, error: EncodingError) -> ImageError {
 }
 
 /// Begins the only part of a PNG or PPM in the digest of stored values.
-pub(super) fn hash_head(hasher: &mut StoredHasher, window: Rect, depth: Depth) {
+fn hash_head(hasher: &mut StoredHasher, window: Rect, depth: Depth) {
     let size = Window {
         x: 0,
         y: 0,

@@ -53,10 +53,9 @@ impl Pending {
 
     /// Gives it its name, in place of what had it. The name is durable once its folder is
     /// synced.
-    pub(crate) fn publish(self) -> Result<PathBuf, ImageError> {
+    pub(crate) fn publish(self) -> Result<(), ImageError> {
         std::fs::rename(&self.partial, &self.target)
-            .map_err(|source| ImageError::io("put in place", &self.target, source))?;
-        Ok(self.target.clone())
+            .map_err(|source| ImageError::io("put in place", &self.target, source))
     }
 }
 

@@ -19,17 +19,45 @@ impl Scratch {
     /// It does not depend on tiling, order or interruptions. Fails if pixels are missing or the
     /// file cannot be read. Holds a strip of 32 rows in memory.
     pub fn film_digest(&self) -> Result<Digest, ImageError> {
-        self.film_digest_by(1)
+        let window = self.window();
+        self.film_digest_from(window.y0, FilmHasher::new(window), 1)
     }
 
-    /// The same, read by so many threads.
-    pub(crate) fn film_digest_by(&self, threads: usize) -> Result<Digest, ImageError> {
+    /// The same by so many threads, where all rows above `row` have been hashed.
+    pub(crate) fn film_digest_from(
+        &self,
+        row: u32,
+        mut hasher: FilmHasher,
+        threads: usize,
+    ) -> Result<Digest, ImageError> {
+        let bytes = |strip: &Strip, bytes: &mut Vec<u8>| {
+            collect(strip, bytes);
+            Ok(())
+        };
+        self.for_each_strip(row, threads, bytes, |bytes| {
+            hasher.hasher.update(bytes);
+            Ok(())
+        })?;
+        Ok(Digest(*hasher.hasher.finalize().as_bytes()))
+    }
+}
+
+/// Takes a film from the top.
+#[derive(Debug)]
+pub(crate) struct FilmHasher {
+    hasher: blake3::Hasher,
+    bytes: Vec<u8>,
+}
+
+impl FilmHasher {
+    /// For the film of a window.
+    pub(crate) fn new(window: Rect) -> Self {
         let mut hasher = blake3::Hasher::new_derive_key("flyby film v1");
         let mut number = |value: u32| {
             hasher.update(&value.to_le_bytes());
         };
         number(FILM_DIGEST_VERSION);
-        let Rect { x0, y0, x1, y1 } = self.window();
+        let Rect { x0, y0, x1, y1 } = window;
         [x0, y0, x1, y1].into_iter().for_each(&mut number);
         number(u32::try_from(CHANNEL_COUNT).expect("a handful of channels"));
         for channel in CHANNELS {
@@ -37,20 +65,25 @@ impl Scratch {
             hasher.update(&length.to_le_bytes());
             hasher.update(channel.name.as_bytes());
         }
-        // By the strip: of short pieces the hash takes several times as long.
-        let bytes = |strip: &Strip, bytes: &mut Vec<u8>| {
-            bytes.clear();
-            for y in strip.rows() {
-                for channel in 0..CHANNEL_COUNT {
-                    append_le_bytes(strip.row(channel, y), bytes);
-                }
-            }
-            Ok(())
-        };
-        self.for_each_strip(threads, bytes, |bytes| {
-            hasher.update(bytes);
-            Ok(())
-        })?;
-        Ok(Digest(*hasher.finalize().as_bytes()))
+        Self {
+            hasher,
+            bytes: Vec::new(),
+        }
+    }
+
+    /// Takes the next strip.
+    pub(crate) fn take(&mut self, strip: &Strip) {
+        collect(strip, &mut self.bytes);
+        self.hasher.update(&self.bytes);
+    }
+}
+
+/// The bytes of a strip, in place of what `bytes` held; of short pieces the hash takes several times as long.
+fn collect(strip: &Strip, bytes: &mut Vec<u8>) {
+    bytes.clear();
+    for y in strip.rows() {
+        for channel in 0..CHANNEL_COUNT {
+            append_le_bytes(strip.row(channel, y), bytes);
+        }
     }
 }

@@ -31,8 +31,9 @@ use self::header::USED_BYTES;
 use self::journal::{Entry, Journal};
 use crate::error::ImageError;
 
+pub(crate) use self::film::FilmHasher;
 pub use self::header::ScratchIdentity;
-pub(crate) use self::strip::{Strip, append_le_bytes};
+pub(crate) use self::strip::{Strip, StripMemory, append_le_bytes};
 
 /// Locks over the slots, so that blocks of one square do not undo each other.
 const SLOT_LOCKS: usize = 16;

@@ -47,74 +47,82 @@ impl Strip {
     }
 }
 
-/// Memory of one strip. It goes from strip to strip: what is given back after each, the system takes and clears again every time.
-struct Memory<R> {
+/// Memory in which strips are read. It goes from strip to strip: what is given back after each, the system takes and clears again
+/// every time.
+#[derive(Debug)]
+pub(crate) struct StripMemory {
     slot: Vec<u8>,
     strip: Strip,
-    made: R,
 }
 
-impl<R: Default> Memory<R> {
-    fn new(rect: Rect) -> Self {
+impl Default for StripMemory {
+    fn default() -> Self {
+        let [x0, y0, x1, y1] = [0; 4];
         Self {
             slot: vec![0; SLOT_BYTES],
             strip: Strip {
-                rect,
+                rect: Rect { x0, y0, x1, y1 },
                 samples: Vec::new(),
             },
-            made: R::default(),
         }
     }
 }
 
 impl Scratch {
-    /// Hands what `of` makes of each strip of the window to `each`, from the top on this thread, while `threads` − 1 others
-    /// go on with the next strips. What is made takes the place of what was made of an earlier strip.
+    /// Hands what `of` makes of each strip of the window from `row` on to `each`, from the top on this thread, while `threads` − 1
+    /// others go on with the next strips. What is made takes the place of what was made of an earlier strip.
     ///
     /// Fails if pixels are missing, if the system refuses, or with the first failure of `of` or `each`.
     pub(crate) fn for_each_strip<R: Default + Send>(
         &self,
+        row: u32,
         threads: usize,
         of: impl Fn(&Strip, &mut R) -> Result<(), ImageError> + Sync,
         mut each: impl FnMut(&mut R) -> Result<(), ImageError>,
     ) -> Result<(), ImageError> {
         self.require_complete()?;
         let window = self.window();
-        let strips = (window.y0..window.y1)
-            .step_by(STRIP_ROWS as usize)
-            .map(|y0| Rect {
-                y0,
-                y1: window.y1.min(y0 + STRIP_ROWS),
-                ..window
-            });
+        let strips = (row..window.y1).step_by(STRIP_ROWS as usize);
+        let strips = strips.map(|row| strip_from(row, window));
         let bytes = CHANNEL_COUNT * 4 * window.width() as usize * STRIP_ROWS as usize;
         let ahead = (AHEAD_BYTES / bytes).clamp(1, 2 * threads.max(1));
         let threads = threads.min(ahead);
-        let spare: Mutex<Vec<Memory<R>>> = Mutex::default();
+        let spare: Mutex<Vec<(StripMemory, R)>> = Mutex::default();
         let make = |rect| {
-            let mut memory = lock(&spare).pop().unwrap_or_else(|| Memory::new(rect));
-            self.read(rect, &mut memory)?;
-            of(&memory.strip, &mut memory.made)?;
-            Ok(memory)
+            let (mut memory, mut made) = lock(&spare).pop().unwrap_or_default();
+            of(self.read(rect, &mut memory)?, &mut made)?;
+            Ok((memory, made))
         };
-        in_sequence(strips, threads, ahead, make, |memory| {
-            let mut memory = memory?;
-            each(&mut memory.made)?;
-            lock(&spare).push(memory);
+        in_sequence(strips, threads, ahead, make, |made| {
+            let (memory, mut made) = made?;
+            each(&mut made)?;
+            lock(&spare).push((memory, made));
             Ok(())
         })
     }
 
-    /// Reads some rows of the window into a strip, whatever it held.
-    fn read<R>(&self, rect: Rect, memory: &mut Memory<R>) -> Result<(), ImageError> {
-        let Memory { slot, strip, .. } = memory;
+    /// The strip of the window that begins with `row`, if there is one and all of it is done.
+    pub(crate) fn done_from(&self, row: u32) -> Option<Rect> {
+        let rect = strip_from(row, self.window());
+        let state = self.state();
+        let is_done = rect.blocks().all(|block| state.coverage.contains(block));
+        (!rect.is_empty() && is_done).then_some(rect)
+    }
+
+    /// Reads some rows of the window.
+    pub(crate) fn read<'m>(
+        &self,
+        rect: Rect,
+        memory: &'m mut StripMemory,
+    ) -> Result<&'m Strip, ImageError> {
+        let StripMemory { slot, strip } = memory;
         strip.rect = rect;
         let pixels = rect.width() as usize * rect.height() as usize;
         strip.samples.resize(CHANNEL_COUNT * pixels, 0.0);
         for block in rect.blocks() {
             self.fill(strip, block, slot)?;
         }
-        Ok(())
+        Ok(strip)
     }
 
     /// Copies one block into its place in the strip.
@@ -140,6 +148,15 @@ impl Scratch {
             }
         }
         Ok(())
+    }
+}
+
+/// The rows of a strip that begins with `row`.
+fn strip_from(row: u32, window: Rect) -> Rect {
+    Rect {
+        y0: row,
+        y1: window.y1.min(row.saturating_add(STRIP_ROWS)),
+        ..window
     }
 }
 

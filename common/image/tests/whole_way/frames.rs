@@ -1,8 +1,8 @@
 //! Frames: written, read back, compared.
 
 use image::{
-    FileKind, Format, FrameRequest, ImageError, SampleKind, Scratch, ScratchIdentity,
-    ViewTransform, Window,
+    Encoding, FileKind, FinishedFile, Format, Formats, FrameRequest, ImageError, SampleKind,
+    Scratch, ScratchIdentity, ViewTransform, Window,
 };
 use image::{compare, file_digest, finish, info};
 use model::film::CHANNELS;
@@ -98,6 +98,64 @@ fn threads_make_the_same_file() {
         {
             assert_eq!(found, expected, "{name} with {threads} threads");
         }
+    }
+}
+
+#[test]
+fn frames_encoded_while_blocks_come_are_the_same_files() {
+    for (case, window) in [RESOLUTION.rect(), CROP, CROP].into_iter().enumerate() {
+        for (formats, threads) in [("exr,png,ppm", 1), ("png16,exr", 3)] {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("film");
+            let request = FrameRequest {
+                threads,
+                ..request(folder.path(), formats)
+            };
+            let scratch = Scratch::create(path, identity(), window).unwrap();
+            let encoding = Encoding::new(&scratch, request.formats, request.view);
+            let mut blocks = blocks(window, 32, 32);
+            match case {
+                0 => {}
+                // The last rows first: all are encoded at the end.
+                1 => blocks.reverse(),
+                _ => blocks.rotate_left(3),
+            }
+            std::thread::scope(|scope| {
+                for part in blocks.chunks(blocks.len().div_ceil(threads)) {
+                    let (scratch, encoding) = (&scratch, &encoding);
+                    scope.spawn(move || {
+                        for block in part {
+                            write_all(scratch, std::slice::from_ref(block));
+                            encoding.go_on(scratch).unwrap();
+                        }
+                    });
+                }
+            });
+            let early = encoding.finish(&scratch, &request).unwrap();
+            let read = |file: &FinishedFile| std::fs::read(&file.path).unwrap();
+            let early_files: Vec<_> = early.files.iter().map(read).collect();
+            let late = finish(&scratch, &request).unwrap();
+            assert_eq!(early, late);
+            let late_files: Vec<_> = late.files.iter().map(read).collect();
+            assert!(early_files == late_files, "{formats} of {window:?}");
+        }
+    }
+}
+
+#[test]
+fn what_was_encoded_for_other_frames_is_left() {
+    let folder = tempfile::tempdir().unwrap();
+    let scratch = finished(folder.path(), CROP);
+    let request = request(folder.path(), "exr,ppm");
+    let expected = finish(&scratch, &request).unwrap();
+    let brighter = ViewTransform {
+        exposure_stops: 1.0,
+    };
+    let ppm = Formats::new([Format::Ppm]);
+    for (formats, view) in [(ppm, request.view), (request.formats, brighter)] {
+        let encoding = Encoding::new(&scratch, formats, view);
+        encoding.go_on(&scratch).unwrap();
+        assert_eq!(encoding.finish(&scratch, &request).unwrap(), expected);
     }
 }
 
@@ -420,7 +478,7 @@ fn a_bad_request_is_an_answer() {
     let mut stem = request(folder.path(), "png");
     stem.stem = "../flyby".into();
     let mut formats = request(folder.path(), "png");
-    formats.formats = image::Formats::default();
+    formats.formats = Formats::default();
     let mut missing = request(&folder.path().join("nowhere"), "png");
     missing.metadata.comments.clear();
     for (request, part) in [
