@@ -15,7 +15,7 @@ use crate::scratch::{FilmHasher, Scratch, Strip, StripMemory};
 use crate::share::in_order;
 use crate::view::ViewTransform;
 
-/// Where so many bytes of one image are encoded, the rest of it waits for its end.
+/// Where so many bytes of one image are encoded, the rest of it waits for its end: one strip more than that is kept at most.
 const KEPT_MAX: usize = 64 << 20;
 
 /// The frames of one image, as far as they are encoded; shared by the threads that deliver its blocks.
