@@ -256,6 +256,32 @@ fn a_task_goes_on_after_the_blocks_that_are_whole() {
 }
 
 #[test]
+fn whoever_looks_ends_or_removes_makes_no_folder() {
+    // A coordinator still asks after a site that was cleaned.
+    let mut desk = Desk::new();
+    let template = desk.place.write("t.sh", "#!/bin/sh\n@script@\n");
+    desk.camp.site.template = Some(template);
+    desk.submit();
+    desk.wait_ended();
+    desk.camp.clean().unwrap();
+    let left = || desk.place.files("there");
+    assert_eq!(left(), [""; 0]);
+    assert!(desk.place.path("there").is_dir());
+    for verb in ["ls", "get"] {
+        let (seen, _) = desk.look(verb, &[NAME], &[Some(0)]);
+        assert_eq!(seen, Seen::default());
+    }
+    let request = Delete {
+        there: desk.there(),
+        tasks: vec![(NAME.to_owned(), None)],
+    };
+    desk.call("del", &request);
+    desk.remove();
+    let left: Vec<_> = fs::read_dir(desk.place.path("there")).unwrap().collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+#[test]
 fn what_cannot_be_rendered_is_said() {
     let desk = Desk::new();
     desk.submit();

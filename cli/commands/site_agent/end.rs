@@ -9,12 +9,12 @@ use cluster::TaskId;
 use cluster::orders::{Delete, Remove};
 
 use super::folder::{Folder, cannot};
-use super::{camp, queue};
+use super::queue;
 use crate::error::Error;
 
 /// Ends arrays or tasks, by name: whatever the queue shows under it.
 pub(super) fn delete(folder: &Folder, request: Delete) -> Result<(), Error> {
-    let camp = camp(folder, request.there)?;
+    let camp = request.there.camp(folder.root());
     let shown = camp.queue.list(&camp.prefix());
     let shown = shown.map_err(queue("cannot ask the queue"))?;
     let live = shown.iter().filter(|task| task.state.is_live());

@@ -16,7 +16,7 @@ use wire::block::BlockRecord;
 use wire::spool::{self, Entry};
 
 use super::folder::{Folder, cannot};
-use super::{camp, queue};
+use super::queue;
 use crate::error::Error;
 
 /// What the queue shows of an array: its tasks by number.
@@ -24,7 +24,7 @@ type Shown = BTreeMap<u32, Stands>;
 
 /// Answers a look on standard output.
 pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
-    let camp = camp(folder, request.there)?;
+    let camp = request.there.camp(folder.root());
     let shown = camp.queue.list(&camp.prefix());
     let shown = by_array(shown.map_err(queue("cannot ask the queue"))?);
     let known: BTreeSet<_> = request.known.iter().map(String::as_str).collect();

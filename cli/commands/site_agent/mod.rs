@@ -1,7 +1,8 @@
 //! `flyby site-agent`: what a coordinator calls on a login node in poll mode, and what the tasks of its arrays run: the
 //! six scripts of thesis §C.3.1. Nobody types it; `cluster::orders` says what is asked and answered.
 //!
-//! Every call may be cut off at any point and made again.
+//! Every call may be cut off at any point and made again. Only one that submits makes a folder: where `flyby site clean` has removed it
+//! a look does not bring it back.
 
 mod end;
 mod folder;
@@ -14,7 +15,7 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 use cluster::ClusterError;
-use cluster::orders::{self, Look};
+use cluster::orders::Look;
 use serde::de::DeserializeOwned;
 
 use self::folder::Folder;
@@ -71,16 +72,16 @@ pub(crate) fn run(command: &SiteAgent) -> Result<Ending, Error> {
             let id = sub::submit(&Folder::made(&place.folder)?, read()?)?;
             say(format!("{id}\n").as_bytes())?;
         }
-        SiteAgent::Del(place) => end::delete(&Folder::made(&place.folder)?, read()?)?,
+        SiteAgent::Del(place) => end::delete(&Folder::new(&place.folder), read()?)?,
         SiteAgent::Ls(place) => {
             let request = Look {
                 wants: Vec::new(),
                 ..read()?
             };
-            look::look(&Folder::made(&place.folder)?, request)?;
+            look::look(&Folder::new(&place.folder), request)?;
         }
-        SiteAgent::Get(place) => look::look(&Folder::made(&place.folder)?, read()?)?,
-        SiteAgent::Rm(place) => end::remove(&Folder::made(&place.folder)?, &read()?)?,
+        SiteAgent::Get(place) => look::look(&Folder::new(&place.folder), read()?)?,
+        SiteAgent::Rm(place) => end::remove(&Folder::new(&place.folder), &read()?)?,
     }
     Ok(Ending::Done)
 }
@@ -110,11 +111,4 @@ fn queue(attempt: &str) -> impl Fn(ClusterError) -> Error {
         let next = error.next();
         Error::failed(attempt.clone()).because(error).next(next)
     }
-}
-
-/// The camp of a request.
-fn camp(folder: &Folder, there: orders::There) -> Result<cluster::Camp, Error> {
-    there
-        .camp(folder.root())
-        .map_err(queue("cannot use the site"))
 }

@@ -7,13 +7,16 @@ use cluster::orders::{Order, Submit, task_script};
 use cluster::{Array, Camp, ClusterError};
 
 use super::folder::{Folder, cannot, sync_parent, write};
-use super::{camp, queue};
+use super::queue;
 use crate::error::Error;
 
 /// Submits an order, once however often it is asked for; answers the queue's number.
 pub(super) fn submit(folder: &Folder, request: Submit) -> Result<String, Error> {
     let Submit { there, order } = request;
-    let camp = camp(folder, there)?;
+    there
+        .put_template(folder.root())
+        .map_err(queue("cannot use the site"))?;
+    let camp = there.camp(folder.root());
     let place = folder.array(&order.name)?;
     if let Some(id) = folder.id(&order.name)? {
         return Ok(id);

@@ -8,6 +8,7 @@
 //! arrays/NAME/id             the queue's number of the array, once it was submitted
 //! arrays/NAME/TASK.blocks    finished blocks, one after the other (`wire::spool`)
 //! scenes/DIGEST              scene descriptions and assets
+//! template                   the site's own template of a task's script
 //! ```
 
 use std::fs;
@@ -30,6 +31,9 @@ pub const FETCH_BLOCKS_MAX: u32 = 4_096;
 
 /// Bytes before each block of an answer: whose it is.
 pub const FRAME_BYTES: usize = 4 + 4 + 8 + 4;
+
+/// The template of a site that has one of its own, in the camp's folder.
+const TEMPLATE_FILE: &str = "template";
 
 /// A site, as its own login node needs it.
 #[derive(Clone, PartialEq, Eq, Debug, Serialize, Deserialize)]
@@ -64,21 +68,27 @@ impl There {
         })
     }
 
-    /// The camp, where one is there already; a template goes into its folder.
-    pub fn camp(mut self, folder: &Path) -> Result<Camp, ClusterError> {
-        if let Some(text) = &self.template {
-            let path = folder.join("template");
-            // A disk that is full disturbs nobody who only looks.
-            if fs::read_to_string(&path).ok().as_ref() != Some(text) {
-                fs::write(&path, text).map_err(|source| ClusterError::File {
-                    attempted: "write the template",
-                    path: path.display().to_string(),
-                    source,
-                })?;
-            }
-            self.site.template = Some(path);
+    /// Writes the template, where there is one, into the folder of the camp: what submits by it needs it.
+    pub fn put_template(&self, folder: &Path) -> Result<(), ClusterError> {
+        let Some(text) = &self.template else {
+            return Ok(());
+        };
+        let path = folder.join(TEMPLATE_FILE);
+        if fs::read_to_string(&path).ok().as_ref() == Some(text) {
+            return Ok(());
         }
-        Ok(Camp::new(self.site, self.farm, folder))
+        fs::write(&path, text).map_err(|source| ClusterError::File {
+            attempted: "write the template",
+            path: path.display().to_string(),
+            source,
+        })
+    }
+
+    /// The camp, in its folder there. Nothing is made.
+    pub fn camp(mut self, folder: &Path) -> Camp {
+        let template = self.template.map(|_| folder.join(TEMPLATE_FILE));
+        self.site.template = template;
+        Camp::new(self.site, self.farm, folder)
     }
 }
 
@@ -414,7 +424,13 @@ mod tests {
             "{text}"
         );
         let there: There = serde_json::from_str(&text).unwrap();
-        let camp_there = there.camp(folder.path()).unwrap();
+        let farm = folder.path().join("farm");
+        let looked = there.clone().camp(&farm);
+        assert!(!farm.exists(), "a look makes nothing");
+        assert_eq!(looked.prefix(), camp.prefix());
+        fs::create_dir(&farm).unwrap();
+        there.put_template(&farm).unwrap();
+        let camp_there = there.camp(&farm);
         assert_eq!(camp_there.prefix(), camp.prefix());
         assert_eq!(camp_there.site.time_limit, Some(Span::from_secs(7_200)));
         let template = fs::read_to_string(camp_there.site.template.unwrap()).unwrap();

@@ -189,6 +189,8 @@ impl<'a> Poller<'a> {
         // What was leased because of that.
         self.hear()?;
         let actions = self.poll.observe(&seen);
+        // Before anything is removed: who sees that it is gone must not find it among what runs.
+        self.count();
         // Before anything is given back: what there is no room for shall not come again.
         self.wants()?;
         // What is given back may come again at once.
@@ -269,6 +271,14 @@ impl<'a> Poller<'a> {
     fn fetch(&mut self) -> Result<Seen, Trouble> {
         loop {
             let Looked { seen, blocks, end } = self.desk.look(&self.poll)?;
+            let brought = blocks.iter().map(|block| block.bytes);
+            let brought = brought.filter(|&bytes| bytes > 0);
+            let (count, bytes) = (brought.clone().count() as u64, brought.sum::<u64>());
+            // Before they are anybody's: who sees a job's last block done finds it among these.
+            self.errand.board.change(self.name(), |site| {
+                site.fetched_blocks += count;
+                site.fetched_bytes += bytes;
+            });
             let mut deliveries = Vec::new();
             for block in &blocks {
                 deliveries.extend(block.delivery.clone());
@@ -281,16 +291,7 @@ impl<'a> Poller<'a> {
                     }
                 }
             }
-            let brought = || {
-                blocks
-                    .iter()
-                    .map(|block| block.bytes)
-                    .filter(|&bytes| bytes > 0)
-            };
-            let (count, bytes) = (brought().count() as u64, brought().sum::<u64>());
             self.errand.board.change(self.name(), |site| {
-                site.fetched_blocks += count;
-                site.fetched_bytes += bytes;
                 site.fetched_again += again;
             });
             // Only now: all before these is durable, or nobody wants it.
@@ -398,6 +399,16 @@ impl<'a> Poller<'a> {
         Ok(())
     }
 
+    /// Says how many tasks wait and run.
+    fn count(&self) {
+        let standing = self.poll.standing();
+        self.errand.board.change(self.name(), |site| {
+            site.waiting = standing.waiting;
+            site.running = standing.running;
+        });
+    }
+
+    /// Says what is held, and what is wrong.
     fn show(&self, trouble: Option<String>) {
         let standing = self.poll.standing();
         let away = (standing.away > 0).then(|| {
@@ -414,8 +425,6 @@ impl<'a> Poller<'a> {
         let trouble = trouble.or_else(|| standing.trouble.clone()).or(away);
         let wanted = u32::try_from(self.poll.held().len()).unwrap_or(u32::MAX);
         self.errand.board.change(self.name(), |site| {
-            site.waiting = standing.waiting;
-            site.running = standing.running;
             site.wanted = wanted;
             site.trouble = trouble.unwrap_or_default();
         });
