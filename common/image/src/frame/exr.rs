@@ -86,9 +86,8 @@ impl Begun {
     /// Takes the next strip of a scratch file.
     pub(super) fn take(&mut self, scratch: &Scratch, strip: &Strip) -> Result<(), ImageError> {
         let first = self.made.tiles.len();
-        let Made { lines, zip, tiles } = &mut self.made;
-        lines.take(strip, self.window, &self.channels);
-        compress(lines, zip, tiles).map_err(|error| refused(scratch.path(), error))?;
+        let taken = self.made.take(strip, self.window, &self.channels);
+        taken.map_err(|error| refused(scratch.path(), error))?;
         self.hasher.samples(&self.made.lines.bytes);
         for (_, chunk) in &mut self.made.tiles[first..] {
             if let CompressedBlock::Tile(block) = &mut chunk.compressed_block {
@@ -130,9 +129,8 @@ impl Begun {
                 for (number, chunk) in made.tiles {
                     chunks.write_chunk(number, chunk)?;
                 }
-                let of = |strip: &Strip, Made { lines, zip, tiles }: &mut Made| {
-                    lines.take(strip, window, &channels);
-                    compress(lines, zip, tiles).map_err(failed)
+                let of = |strip: &Strip, made: &mut Made| {
+                    made.take(strip, window, &channels).map_err(failed)
                 };
                 let each = |Made { lines, tiles, .. }: &mut Made| {
                     hasher.samples(&lines.bytes);
@@ -189,6 +187,36 @@ struct Made {
     tiles: Vec<(usize, Chunk)>,
 }
 
+impl Made {
+    /// Adds the tiles of a strip, and holds its lines.
+    fn take(
+        &mut self,
+        strip: &Strip,
+        window: Rect,
+        channels: &[usize; CHANNEL_COUNT],
+    ) -> Result<(), ExrError> {
+        self.lines.take(strip, window, channels);
+        let (row, columns) = (self.lines.row, self.lines.width.div_ceil(TILE));
+        for column in 0..columns {
+            let samples = self.lines.tile(column);
+            let compressed_pixels_le = self.zip.compress(samples).map_err(io::Error::from)?;
+            let block = CompressedTileBlock {
+                coordinates: TileCoordinates {
+                    tile_index: Vec2(column, row),
+                    level_index: Vec2(0, 0),
+                },
+                compressed_pixels_le,
+            };
+            let chunk = Chunk {
+                layer_index: 0,
+                compressed_block: CompressedBlock::Tile(block),
+            };
+            self.tiles.push((row * columns + column, chunk));
+        }
+        Ok(())
+    }
+}
+
 /// The lines of a strip as they are stored: for each row, for each channel of the file, its bytes.
 #[derive(Default)]
 struct Lines {
@@ -236,27 +264,6 @@ impl Lines {
         }
         samples
     }
-}
-
-/// The tiles of a strip with their numbers in the file.
-fn compress(lines: &Lines, zip: &mut Zip, tiles: &mut Vec<(usize, Chunk)>) -> Result<(), ExrError> {
-    let columns = lines.width.div_ceil(TILE);
-    for column in 0..columns {
-        let compressed_pixels_le = zip.compress(lines.tile(column)).map_err(io::Error::from)?;
-        let block = CompressedTileBlock {
-            coordinates: TileCoordinates {
-                tile_index: Vec2(column, lines.row),
-                level_index: Vec2(0, 0),
-            },
-            compressed_pixels_le,
-        };
-        let chunk = Chunk {
-            layer_index: 0,
-            compressed_block: CompressedBlock::Tile(block),
-        };
-        tiles.push((lines.row * columns + column, chunk));
-    }
-    Ok(())
 }
 
 /// Appends the nearest halves, little-endian; the largest finite one for what lies beyond.
