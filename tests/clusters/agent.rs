@@ -130,6 +130,7 @@ impl Desk {
                 offsets: offsets.to_vec(),
                 but: but.to_vec(),
             }],
+            room: true,
         };
         let said = self.call(verb, &request).stdout;
         let line = said.iter().position(|&byte| byte == b'\n').unwrap();

@@ -70,14 +70,14 @@ impl Flight {
     #[track_caller]
     pub(crate) fn wait_trouble(&self, phrases: &[&str]) {
         let what = format!("the site's trouble holds {phrases:?}");
-        wait::until(&what, || {
-            let site = self.site();
-            let trouble = site["trouble"].as_str()?;
-            phrases
-                .iter()
-                .all(|phrase| trouble.contains(phrase))
-                .then_some(())
-        });
+        wait::until(&what, || self.has_trouble(phrases).then_some(()));
+    }
+
+    /// Whether the site's trouble holds these words now.
+    pub(crate) fn has_trouble(&self, phrases: &[&str]) -> bool {
+        let site = self.site();
+        let trouble = site["trouble"].as_str();
+        trouble.is_some_and(|trouble| phrases.iter().all(|phrase| trouble.contains(phrase)))
     }
 
     pub(crate) fn clean(&self) {

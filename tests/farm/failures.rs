@@ -167,6 +167,7 @@ fn what_is_acknowledged_is_not_leased_again() {
     let answer = first.block(&mut delivery, header.record(&pixels).unwrap());
     assert!(matches!(answer, Answer::Acknowledged(_)), "{answer:?}");
     drop((control, delivery, first));
+    farm.wait_connected(0);
 
     let mut second = Raw::connect(farm.address, &token);
     let mut control = second.hello(raw::worker(2)).unwrap();

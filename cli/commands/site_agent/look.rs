@@ -48,7 +48,7 @@ pub(super) fn look(folder: &Folder, request: Look) -> Result<(), Error> {
     let seen = Seen {
         arrays,
         files: names(&folder.scenes())?,
-        full: full(&camp),
+        full: request.room.then(|| full(&camp)).flatten(),
     };
     answer(folder, &seen, &request.wants)
         .map_err(|error| Error::failed("cannot answer").because(error))

@@ -201,6 +201,8 @@ pub struct Look {
     pub known: Vec<String>,
     /// Arrays whose blocks are wanted.
     pub wants: Vec<Wants>,
+    /// Whether it is to be tried if there is room for more.
+    pub room: bool,
 }
 
 /// Of which tasks of an array blocks are wanted.

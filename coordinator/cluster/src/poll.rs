@@ -143,6 +143,11 @@ impl Poll {
         self.full.as_ref()
     }
 
+    /// Whether it matters if there is room for more: who brings nothing writes nothing there.
+    pub fn asks_for_room(&self) -> bool {
+        !self.tiles.is_empty() || self.full.is_some()
+    }
+
     /// Whether there is anything at the site, or should be.
     pub fn is_empty(&self) -> bool {
         self.tiles.is_empty() && self.arrays.is_empty()

@@ -25,6 +25,10 @@ pub(crate) struct Worker {
     pub(crate) draining: Draining,
     /// Until when it may run.
     pub(crate) runs_until: Option<Timestamp>,
+    /// Its blocks that are being written.
+    pub(crate) storing: u64,
+    /// Its link that closed meanwhile: told to the scheduler behind those blocks, lest others be asked for them.
+    pub(crate) closing: Option<LinkId>,
 }
 
 /// Processes that are remembered after they were told to leave and were lost; those that were lost first are forgotten.

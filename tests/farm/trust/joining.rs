@@ -1,9 +1,10 @@
 //! Workers join by a token's file, stay by a certificate, and are let go by revoking.
 
 use std::fs;
+use std::time::{Duration, SystemTime};
 
 use crate::harness::scenes::{FLYBY, TINY, slow, small};
-use crate::harness::{Farm, Place, Process, need, wait};
+use crate::harness::{Farm, Place, Process, Signal, need, wait};
 
 const UNREACHABLE: i32 = 3;
 
@@ -75,6 +76,32 @@ fn certificates_are_renewed_while_a_job_is_rendered() {
     let list = there.flyby(["job", "list", "--token-file", &user, "--output", "quiet"]);
     assert_eq!(list.ok().trim(), job.to_string());
     assert_eq!(farm.connected(), 1);
+    let said = worker.stderr();
+    assert!(!said.contains("link to the coordinator is gone"), "{said}");
+}
+
+#[test]
+fn a_worker_that_slept_past_its_certificate_gets_another() {
+    let Some(address) = need::address() else {
+        return;
+    };
+    // Its link outlives the sleep: nothing but the certificate is old.
+    let farm = Farm::reachable(
+        address,
+        &["--certificate-life", "3 s", "--liveness", "100 s"],
+    );
+    let token = farm.token("w.token", &[]);
+    let worker = worker(&Place::new(), &token);
+    farm.wait_connected(1);
+    worker.signal(Signal::Stop);
+    let counts_no_more = SystemTime::now() + Duration::from_secs(5);
+    wait::until("its certificate counts no more", || {
+        (SystemTime::now() > counts_no_more).then_some(())
+    });
+    worker.signal(Signal::Continue);
+    wait::until("the worker has another certificate", || {
+        (worker.stderr().matches("has joined").count() == 2).then_some(())
+    });
     let said = worker.stderr();
     assert!(!said.contains("link to the coordinator is gone"), "{said}");
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use image::FinishedFile;
-use model::ImageRef;
+use model::{ImageRef, JobId};
 use sched::{Command, Effect, Event, ImageState};
 use store::Entry;
 
@@ -21,6 +21,8 @@ pub(super) struct Held {
     queue: VecDeque<Waiting>,
     records: Ticket,
     committed: Ticket,
+    /// Jobs whose end waits for a record, in the order of these.
+    ending: VecDeque<(Ticket, JobId)>,
     is_performing: bool,
 }
 
@@ -37,6 +39,28 @@ impl Held {
     /// Whether so much waits that nobody may add to it.
     pub(super) fn is_full(&self) -> bool {
         self.queue.len() >= HELD_MAX
+    }
+
+    /// Whether a job's end is decided and not durable: for whoever asks it is not over yet, and its log does not say so.
+    pub(super) fn is_ending(&self, job: JobId) -> bool {
+        self.ending.iter().any(|&(_, ending)| ending == job)
+    }
+
+    /// A job's end was decided, by what is recorded up to now.
+    fn ends(&mut self, job: JobId) {
+        if self.records > self.committed {
+            self.ending.push_back((self.records, job));
+        }
+    }
+
+    /// Every record up to this one is durable.
+    fn commit(&mut self, ticket: Ticket) {
+        self.committed = ticket;
+        while self
+            .ending
+            .pop_front_if(|&mut (waits, _)| waits <= ticket)
+            .is_some()
+        {}
     }
 }
 
@@ -74,6 +98,9 @@ impl Shell {
             }
         }
         for effect in effects {
+            if let Effect::JobDone { job, .. } = effect {
+                self.held.ends(job);
+            }
             self.held.queue.push_back(match effect {
                 Effect::Encode { image } => Waiting::Encode(image, self.era(image)),
                 effect => Waiting::Effect(effect),
@@ -84,7 +111,7 @@ impl Shell {
 
     /// Every record up to this one is durable.
     pub(super) fn committed(&mut self, ticket: Ticket) {
-        self.held.committed = ticket;
+        self.held.commit(ticket);
         self.flush();
     }
 
@@ -180,4 +207,27 @@ impl Shell {
 /// Whether an event is committed after the scheduler heard of it; blocks are before.
 fn is_recorded(event: &Event) -> bool {
     event.is_durable() && !matches!(event, Event::BlockStored { .. })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_job_is_not_over_before_its_end_is_durable() {
+        let mut held = Held::default();
+        held.ends(JobId(1));
+        assert!(!held.is_ending(JobId(1)), "it waits for nothing");
+        held.records = 2;
+        held.ends(JobId(2));
+        held.records = 3;
+        held.ends(JobId(3));
+        held.commit(1);
+        let are_ending = |held: &Held| [1, 2, 3].map(|job| held.is_ending(JobId(job)));
+        assert_eq!(are_ending(&held), [false, true, true]);
+        held.commit(2);
+        assert_eq!(are_ending(&held), [false, false, true]);
+        held.commit(3);
+        assert_eq!(are_ending(&held), [false; 3]);
+    }
 }

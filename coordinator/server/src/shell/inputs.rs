@@ -23,7 +23,9 @@ impl Shell {
         match news {
             News::Stored(group) => {
                 for stored in group {
+                    let worker = stored.arrived.worker;
                     self.stored(stored);
+                    self.has_stored(worker);
                 }
             }
             News::Committed(ticket) => self.committed(ticket),
@@ -119,6 +121,7 @@ impl Shell {
         // An older link of the same process is dropped with its streams.
         let draining = self.workers.get(&worker).map(|known| known.draining);
         let draining = draining.unwrap_or_else(|| self.leaving.take(worker));
+        let storing = self.workers.get(&worker).map_or(0, |known| known.storing);
         let runs_until = about.time_left.map(|left| self.now() + left);
         self.workers.insert(
             worker,
@@ -129,6 +132,8 @@ impl Shell {
                 delivery: None,
                 draining,
                 runs_until,
+                storing,
+                closing: None,
             },
         );
         self.feed(event);
@@ -147,7 +152,19 @@ impl Shell {
                     worker.delivery = None;
                 }
                 tracing::info!(worker = %id, "a worker's link closed");
+                // What it brought before is written first: whoever takes its tiles is not asked for that again.
+                let waits = worker.storing > 0;
+                let before = match waits {
+                    true => worker.closing.replace(link),
+                    false => None,
+                };
                 self.tell_jobs_of_closed_link(id);
+                if let Some(link) = before {
+                    self.feed(Event::LinkClosed { worker: id, link });
+                }
+                if waits {
+                    return;
+                }
             }
             _ if !newest => return,
             Event::TileFailed {
@@ -299,6 +316,9 @@ impl Shell {
             Verdict::Accept => match self.jobs.get(block.image.job) {
                 Some(job) => {
                     let era = self.era(block.image);
+                    if let Some(worker) = self.workers.get_mut(&worker) {
+                        worker.storing += 1;
+                    }
                     self.storage.store(job.plan.clone(), arrived, era);
                 }
                 None => tracing::error!(?block, "a block of a job that is not known"),
@@ -360,6 +380,19 @@ impl Shell {
         // Another attempt's had made its pixels durable, or nobody wants them.
         if self.blocks_done(image.job) == before {
             count(self, Sign::Minus);
+        }
+    }
+
+    /// A worker's block was written, or refused; behind its last one the end of its link is told.
+    fn has_stored(&mut self, id: WorkerId) {
+        let Some(worker) = self.workers.get_mut(&id) else {
+            return;
+        };
+        worker.storing = worker.storing.saturating_sub(1);
+        if worker.storing == 0
+            && let Some(link) = worker.closing.take()
+        {
+            self.feed(Event::LinkClosed { worker: id, link });
         }
     }
 

@@ -6,7 +6,7 @@
 //!
 //! What is durable comes before what is said. A block is written, synced and committed before the scheduler hears of it. Any
 //! other durable event is told first, and its effects wait, with all later ones behind them, until it
-//! is committed (`hold`).
+//! is committed (`hold`). A link that closed is told behind the blocks that came by it.
 
 mod effects;
 mod hold;

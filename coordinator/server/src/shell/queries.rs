@@ -77,7 +77,13 @@ impl Shell {
     /// A job in one line.
     pub(super) fn summary(&self, id: JobId) -> Option<proto::JobSummary> {
         let view = self.sched.job(id)?;
-        Some(views::summary(&view, self.jobs.get(id)?))
+        let ended = match view.state {
+            sched::JobState::Over(outcome) if !self.held.is_ending(id) => {
+                Some((outcome, view.ended))
+            }
+            _ => None,
+        };
+        Some(views::summary(&view, ended, self.jobs.get(id)?))
     }
 
     /// The same, with how long it will still take.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use model::{ImageNumber, ImageRef, JobId};
+use model::{ImageNumber, ImageRef, JobId, Timestamp};
 use sched::{ImageFailure, ImageView, JobOutcome, JobView, Sched, WorkerView};
 use wire::Failure;
 use wire::proto::{self, ErrorKind};
@@ -27,14 +27,18 @@ pub(super) fn no_worker(name: &str) -> Failure {
     )
 }
 
-/// A job in one line.
-pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
+/// A job in one line. `ended`: how and when, if that may be told.
+pub(super) fn summary(
+    view: &JobView<'_>,
+    ended: Option<(JobOutcome, Option<Timestamp>)>,
+    job: &Job,
+) -> proto::JobSummary {
     let resolution = job.plan.identity.resolution;
-    let state = match view.state {
-        sched::JobState::Running => proto::JobState::Running,
-        sched::JobState::Over(JobOutcome::Finished) => proto::JobState::Done,
-        sched::JobState::Over(JobOutcome::Failed) => proto::JobState::Failed,
-        sched::JobState::Over(JobOutcome::Cancelled) => proto::JobState::Cancelled,
+    let state = match ended {
+        None => proto::JobState::Running,
+        Some((JobOutcome::Finished, _)) => proto::JobState::Done,
+        Some((JobOutcome::Failed, _)) => proto::JobState::Failed,
+        Some((JobOutcome::Cancelled, _)) => proto::JobState::Cancelled,
     };
     proto::JobSummary {
         job: view.job.0,
@@ -51,7 +55,7 @@ pub(super) fn summary(view: &JobView<'_>, job: &Job) -> proto::JobSummary {
         pixels_again: view.pixels_again,
         submitted_unix_ms: unix_ms(view.submitted),
         started_unix_ms: view.started.map_or(0, unix_ms),
-        finished_unix_ms: view.ended.map_or(0, unix_ms),
+        finished_unix_ms: ended.and_then(|(_, at)| at).map_or(0, unix_ms),
         description_digest: view.scene.0.to_vec(),
         width: resolution.width,
         height: resolution.height,

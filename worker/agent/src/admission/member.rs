@@ -110,7 +110,7 @@ impl Member {
             let Some(current) = standing.as_mut() else {
                 continue;
             };
-            match self.fresh(&current.way).await {
+            match self.renewed(current).await {
                 Ok((fresh, connection)) => {
                     fetching.send_replace(Some(connection));
                     tracing::info!(
@@ -154,8 +154,19 @@ impl Member {
         Ok(standing)
     }
 
-    /// A certificate for the one that is shown, and a connection that was opened with it.
-    async fn fresh(&self, way: &Way) -> Result<(Standing, Workers), Failure> {
+    /// A certificate in place of one, and a connection that was opened with it. For one that counts no more, as after a sleep,
+    /// none is given: the token gives another.
+    async fn renewed(&self, current: &Standing) -> Result<(Standing, Workers), Failure> {
+        let renewed = match current.claims.age(now()) {
+            Age::Expired => self.join().await?,
+            Age::TooYoung | Age::Alive => self.fresh(&current.way).await?,
+        };
+        let connection = timely(link::workers(&renewed.way)).await?;
+        Ok((renewed, connection))
+    }
+
+    /// A certificate for the one that is shown.
+    async fn fresh(&self, way: &Way) -> Result<Standing, Failure> {
         let request = proto::RenewRequest {
             public_key: self.place.key.public_key_raw().to_vec(),
         };
@@ -163,9 +174,7 @@ impl Member {
             let mut joining = link::joining(way).await?;
             Ok(joining.renew(request).await?.into_inner())
         });
-        let fresh = self.taken(answer.await?)?;
-        let connection = timely(link::workers(&fresh.way)).await?;
-        Ok((fresh, connection))
+        self.taken(answer.await?)
     }
 
     /// A certificate as the coordinator sent it: used from now on, and kept.

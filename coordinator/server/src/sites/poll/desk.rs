@@ -56,6 +56,7 @@ impl<'a> Desk<'a> {
             there: self.there.clone(),
             known: poll.known(),
             wants: Vec::new(),
+            room: false,
         };
         let attempt = "looking at arrays";
         let said = self.ask(attempt, "ls", &request)?;
@@ -70,6 +71,7 @@ impl<'a> Desk<'a> {
             there: self.there.clone(),
             known: poll.known(),
             wants,
+            room: poll.asks_for_room(),
         };
         let script = call(self.camp, "get", &request)?;
         let attempt = "looking at arrays";
