@@ -1,5 +1,7 @@
 //! Noise over the lanes of a batch: the loops that a SIMD level vectorises.
 
+use std::ops::{Deref, DerefMut};
+
 use fearless_simd::Simd;
 
 use crate::cascade::Octave;
@@ -9,8 +11,29 @@ use crate::points::BATCH;
 /// One number per lane.
 pub(crate) type Lanes = [f64; BATCH];
 
+/// What begins where a cache line does, as all rows of lanes do here and in the renderer: a vector that lies across two lines is
+/// loaded twice.
+#[derive(Debug)]
+#[repr(align(64))]
+pub(crate) struct Aligned<T>(pub(crate) T);
+
+impl<T> Deref for Aligned<T> {
+    type Target = T;
+
+    fn deref(&self) -> &T {
+        &self.0
+    }
+}
+
+impl<T> DerefMut for Aligned<T> {
+    fn deref_mut(&mut self) -> &mut T {
+        &mut self.0
+    }
+}
+
 /// Lattice cells, the offsets within them, and room for the hashes of their corners.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(crate) struct Cells {
     cell: [[u32; BATCH]; 3],
     offset: [[f32; BATCH]; 3],

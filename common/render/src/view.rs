@@ -40,6 +40,7 @@ pub(crate) struct Sight {
 }
 
 /// Memory in which rays of sight are computed, lane by lane.
+#[repr(align(64))]
 pub(crate) struct Rows {
     x: Lanes,
     y: Lanes,

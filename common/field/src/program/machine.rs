@@ -7,7 +7,7 @@ use fearless_simd::Simd;
 
 use crate::arithmetic::{self, Binary, Unary};
 use crate::cascade::{self, Carried, Cascade, Model, Term};
-use crate::lanes::{self, Cells, Lanes};
+use crate::lanes::{self, Aligned, Cells, Lanes};
 use crate::noise::batch;
 use crate::op::Basis;
 use crate::points::{BATCH, Points};
@@ -20,16 +20,17 @@ pub(crate) const STEP: usize = 16;
 #[derive(Debug)]
 #[expect(clippy::vec_box, reason = "results take their places by pointer")]
 pub(crate) struct Machine {
-    registers: Vec<Box<Lanes>>,
+    registers: Vec<Box<Aligned<Lanes>>>,
     /// What the constant registers hold.
     constants: Vec<f64>,
     /// Where a result is computed before it takes its register's place.
-    result: Box<Lanes>,
+    result: Box<Aligned<Lanes>>,
     octaves: Box<Octaves>,
 }
 
 /// Room for the octaves of one cascade.
 #[derive(Debug)]
+#[repr(align(64))]
 struct Octaves {
     cells: Cells,
     noise: [f32; BATCH],
@@ -42,7 +43,7 @@ impl Default for Machine {
         Self {
             registers: Vec::new(),
             constants: Vec::new(),
-            result: Box::new([0.0; BATCH]),
+            result: Box::new(Aligned([0.0; BATCH])),
             octaves: Box::new(Octaves {
                 cells: Cells::new(),
                 noise: [0.0; BATCH],
@@ -117,7 +118,7 @@ pub(crate) fn load<'r>(
 impl Machine {
     /// Makes room for the code and sets its constants.
     pub(crate) fn prepare(&mut self, code: &Code) {
-        let new = || Box::new([0.0; BATCH]);
+        let new = || Box::new(Aligned([0.0; BATCH]));
         let (registers, constants) = (&mut self.registers, &mut self.constants);
         prepare(registers, constants, code, new, |lanes, value| {
             lanes.fill(value);
@@ -154,8 +155,8 @@ impl Machine {
     fn step<S: Simd>(&mut self, simd: S, instruction: &Instruction, count: Count) -> u64 {
         let n = count.lanes;
         assert!(n <= BATCH);
-        let [a, b, c] = instruction.args.map(|arg| &*self.registers[arg]);
-        let out = &mut *self.result;
+        let [a, b, c] = instruction.args.map(|arg| &**self.registers[arg]);
+        let out = &mut **self.result;
         match &instruction.act {
             Operation::Unary(unary) => unary_lanes(*unary, n, a, out),
             Operation::Binary(binary) => binary_lanes(*binary, n, a, b, out),

@@ -41,6 +41,7 @@ impl Sunlit {
 }
 
 /// Places of the surface, lane by lane.
+#[repr(align(64))]
 pub(crate) struct Lits {
     normal: [Lanes; 3],
     direction: [Lanes; 3],

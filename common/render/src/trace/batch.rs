@@ -5,10 +5,11 @@ use glam::DVec3;
 
 use super::surface::Surface;
 
-/// One number per lane.
+/// One number per lane. What holds some is laid out so that each begins where a cache line does.
 pub(crate) type Lanes = [f64; BATCH];
 
 /// What of a ray decides where its places are and how wide a pixel is there.
+#[repr(align(64))]
 pub(crate) struct Paths {
     pub(crate) origin: [Lanes; 3],
     pub(crate) direction: [Lanes; 3],
@@ -20,6 +21,7 @@ pub(crate) struct Paths {
 }
 
 /// Places and values, lane by lane.
+#[repr(C, align(64))]
 pub(crate) struct Batch {
     pub(crate) place: [Lanes; 3],
     /// From the eye, metres.

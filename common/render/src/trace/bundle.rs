@@ -65,6 +65,7 @@ pub(crate) struct Bundles {
 }
 
 /// Where the bundles stand, and how wide they are: `radius` + `spread` · t.
+#[repr(align(64))]
 struct Rows {
     t: Lanes,
     radius: Lanes,

@@ -9,6 +9,7 @@ use super::bundle::Span;
 use super::tracer::Ray;
 
 /// Memory in which rays are clipped.
+#[repr(align(64))]
 pub(crate) struct Clips {
     origin: [Lanes; 3],
     direction: [Lanes; 3],

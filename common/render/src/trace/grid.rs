@@ -92,6 +92,7 @@ impl Grid {
 
 /// The grids of a batch's lanes: structure of arrays.
 #[derive(Clone, Debug)]
+#[repr(align(64))]
 pub(crate) struct StepRows {
     base: [u64; BATCH],
     last: [u64; BATCH],

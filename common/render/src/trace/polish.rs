@@ -42,6 +42,7 @@ pub(crate) struct Polish {
     t: Box<Row>,
 }
 
+#[repr(align(64))]
 struct Row(Lanes);
 
 impl Default for Row {

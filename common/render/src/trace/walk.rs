@@ -19,6 +19,7 @@ pub(crate) struct Walks {
     rows: Box<Rows>,
 }
 
+#[repr(align(64))]
 struct Rows {
     offset: Lanes,
     limit: Lanes,

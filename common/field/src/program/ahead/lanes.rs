@@ -22,6 +22,7 @@ pub(super) fn row(lanes: &Lanes, start: usize) -> &Row {
 
 /// Stretches, one per lane, as structure of arrays.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(super) struct Stretches {
     pub(super) low: Row,
     pub(super) high: Row,

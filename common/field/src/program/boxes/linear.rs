@@ -26,6 +26,7 @@ pub(super) struct Linear {
 
 /// Linear functions, one per lane, as structure of arrays.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(super) struct Linears {
     pub(super) centre: Lanes,
     pub(super) along: [Lanes; 3],

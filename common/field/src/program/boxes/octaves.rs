@@ -24,6 +24,7 @@ const BEND_MAX: f64 = 0.5;
 
 /// Room for the octaves of one cascade.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(super) struct Octaves {
     /// The least and the greatest footprints.
     pub(super) footprint: [Lanes; 2],
@@ -36,6 +37,7 @@ pub(super) struct Octaves {
 
 /// A noise in the middles of boxes.
 #[derive(Debug)]
+#[repr(align(64))]
 struct Samples {
     cells: Cells,
     value: [f32; BATCH],

@@ -7,6 +7,7 @@ use crate::shape::Rows;
 
 /// Duals, one per lane, as structure of arrays.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(crate) struct Duals<const N: usize> {
     pub(crate) value: Lanes,
     pub(crate) gradient: [Lanes; N],

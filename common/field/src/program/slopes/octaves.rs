@@ -15,6 +15,7 @@ use crate::program::machine::{self, Count};
 
 /// Room for the octaves of one cascade.
 #[derive(Debug)]
+#[repr(C, align(64))]
 pub(super) struct Octaves<const N: usize> {
     pub(super) cells: Cells,
     /// Directions in the octave's lattice; of use where `N` is 1.

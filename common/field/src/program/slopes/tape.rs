@@ -73,6 +73,7 @@ impl<const N: usize> Tape<N> {
 
 /// One octave's noise over the lanes.
 #[derive(Debug)]
+#[repr(align(64))]
 pub(crate) struct Sample<const N: usize> {
     pub(crate) noise: [f32; BATCH],
     pub(crate) gradient: [[f32; BATCH]; N],

@@ -54,6 +54,7 @@ const TRIES_MAX: f32 = 512.0;
 type Row = [f32; LANES];
 
 /// Rays under way, as structure of arrays. Places are seen from the eye, in the ground's frame.
+#[repr(align(64))]
 struct Lanes {
     origin: [Row; 3],
     direction: [Row; 3],

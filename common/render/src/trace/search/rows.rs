@@ -26,6 +26,7 @@ const FARTHER: f64 = 1.3;
 const STEP: usize = 8;
 
 /// The state of the lanes: distances along the rays, all of them points of the rays' grids.
+#[repr(align(64))]
 pub(super) struct Rows {
     /// The grids of the rays.
     pub(super) steps: StepRows,
