@@ -11,7 +11,7 @@ use crate::points::BATCH;
 /// One number per lane.
 pub(crate) type Lanes = [f64; BATCH];
 
-/// What begins where a cache line does, as all rows of lanes do here and in the renderer: a vector that lies across two lines is
+/// What begins where a cache line does, as rows of lanes do here and in the renderer: a vector that lies across two lines is
 /// loaded twice.
 #[derive(Debug)]
 #[repr(align(64))]

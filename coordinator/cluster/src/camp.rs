@@ -148,13 +148,14 @@ impl Camp {
     }
 
     /// Sees that its folder there takes more: by writing, since no count of free bytes knows of quotas. Where it was not made yet
-    /// that is tried beside it. The file has no name while it is written: nothing of it stays, whatever becomes of who writes.
+    /// that is tried beside it. The file has no name while it is written, where that may be: nothing of it stays, whatever becomes of
+    /// who writes.
     pub fn has_room(&self) -> Result<(), ClusterError> {
         let folder = quote_path(&self.folder());
         let script = format!(
             "d={folder}; [ -d \"$d\" ] || d=$(dirname \"$(dirname \"$d\")\")\n\
              while [ ! -d \"$d\" ]; do d=$(dirname \"$d\"); done; f=$d/.room.$$\n\
-             {{ rm -f \"$f\"; head -c {ROOM_BYTES} /dev/zero; }} >\"$f\""
+             {{ rm -f \"$f\"; head -c {ROOM_BYTES} /dev/zero; }} >\"$f\"; code=$?; rm -f \"$f\"; exit $code"
         );
         let found = self.way.ask("writing there", "head", &script);
         found.map(|_| ()).map_err(|error| self.full(error))

@@ -201,8 +201,13 @@ pub struct Look {
     pub known: Vec<String>,
     /// Arrays whose blocks are wanted.
     pub wants: Vec<Wants>,
-    /// Whether it is to be tried if there is room for more.
+    /// Whether it is to be tried if there is room for more; coordinators of before always wanted that.
+    #[serde(default = "always")]
     pub room: bool,
+}
+
+fn always() -> bool {
+    true
 }
 
 /// Of which tasks of an array blocks are wanted.

@@ -154,15 +154,16 @@ impl Shell {
                 tracing::info!(worker = %id, "a worker's link closed");
                 // What it brought before is written first: whoever takes its tiles is not asked for that again.
                 let waits = worker.storing > 0;
-                let before = match waits {
-                    true => worker.closing.replace(link),
-                    false => None,
-                };
-                self.tell_jobs_of_closed_link(id);
-                if let Some(link) = before {
-                    self.feed(Event::LinkClosed { worker: id, link });
-                }
                 if waits {
+                    worker.closing = worker.closing.max(Some(link));
+                }
+                self.tell_jobs_of_closed_link(id);
+                if waits {
+                    // Meanwhile it gets nothing more.
+                    if newest {
+                        let (worker, credit) = (id, 0);
+                        self.feed(Event::Credit { worker, credit });
+                    }
                     return;
                 }
             }

@@ -221,7 +221,7 @@ impl Shell {
                 continue;
             };
             job.tell_watchers(summary, |job, image| {
-                views::image_status(sched, id, job, image)
+                views::image_status(sched, id, job, image, over)
             });
             if over {
                 job.dismiss_watchers();

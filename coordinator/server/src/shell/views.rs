@@ -138,17 +138,15 @@ impl<'a> Reasons<'a> {
     }
 }
 
-/// An image as it is now, on its own.
+/// An image as it is now, on its own. `over`: its job is.
 pub(super) fn image_status(
     sched: &Sched,
     id: JobId,
     job: &Job,
     image: ImageNumber,
+    over: bool,
 ) -> Option<proto::ImageStatus> {
     let view = sched.image(ImageRef { job: id, image })?;
-    let over = sched
-        .job(id)
-        .is_some_and(|job| job.state != sched::JobState::Running);
     let reasons = match view.state {
         sched::ImageState::Failed => Reasons::of(sched.failures(id)),
         _ => Reasons(BTreeMap::new()),

@@ -154,12 +154,12 @@ impl Member {
         Ok(standing)
     }
 
-    /// A certificate in place of one, and a connection that was opened with it. For one that counts no more, as after a sleep,
-    /// none is given: the token gives another.
+    /// A certificate in place of one, and a connection that was opened with it. For one that counts no more by the coordinator's
+    /// clock, as after a sleep, none is given: the token gives another while it lives.
     async fn renewed(&self, current: &Standing) -> Result<(Standing, Workers), Failure> {
-        let renewed = match current.claims.age(now()) {
-            Age::Expired => self.join().await?,
-            Age::TooYoung | Age::Alive => self.fresh(&current.way).await?,
+        let renewed = match self.fresh(&current.way).await {
+            Err(failure) if failure.kind == ErrorKind::Unauthenticated => self.join().await?,
+            fresh => fresh?,
         };
         let connection = timely(link::workers(&renewed.way)).await?;
         Ok((renewed, connection))
