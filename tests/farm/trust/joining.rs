@@ -91,7 +91,8 @@ fn a_worker_that_slept_past_its_certificate_gets_another() {
         &["--certificate-life", "3 s", "--liveness", "100 s"],
     );
     let token = farm.token("w.token", &[]);
-    let worker = worker(&Place::new(), &token);
+    let there = Place::new();
+    let worker = worker(&there, &token);
     farm.wait_connected(1);
     worker.signal(Signal::Stop);
     let counts_no_more = SystemTime::now() + Duration::from_secs(5);
